@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,15 +29,24 @@ def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     # Before its name is replaced, which the import would otherwise copy for good.
     import matplotlib.pyplot as plt
 
-    import piezotrack.identification.views.report  # noqa: F401
+    modules = [
+        import_module(f"piezotrack.{name}")
+        for name in (
+            "_support.files",
+            "identification.comparison.compare",
+            "identification.experiments.sensor_noise",
+            "identification.experiments.step_response",
+            "identification.views.report",
+        )
+    ]
 
     def none(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
         del figures, folder
         plt.close("all")
         return []
 
-    for module in ("_support.files", "identification.views.report"):
-        monkeypatch.setattr(f"piezotrack.{module}.save_figures", none)
+    for module in modules:
+        monkeypatch.setattr(module, "save_figures", none)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -80,7 +80,9 @@ TAKERS: dict[str, Taker] = {
     "VirtualStage.record": Taker(lambda u: VIRTUAL.record(u, DT).y),
     "XYStage.simulate": Taker(lambda u, w: XY.simulate(u, w, DT), arrays=2),
     "XYStage.record": Taker(lambda u, w: XY.record(u, w, DT).y.y, arrays=2),
-    "IdentifiedModel.beyond_fit": Taker(lambda u: np.array([len(MODEL.beyond_fit(u, DT))])),
+    "IdentifiedModel.extrapolation_notes": Taker(
+        lambda u: np.array([len(MODEL.extrapolation_notes(u, DT))])
+    ),
     "IdentifiedModel.displacement": Taker(lambda u: MODEL.displacement(u, DT)),
     "Dataset": Taker(
         lambda u, y, c: (

@@ -111,14 +111,9 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "IdentifiedModel.score offset": lambda v: FIT.score(LOG, offset=v),
     "Tracking.plot_effort": lambda v: RUN.plot_effort(ax=v),
     "Contour.plot_magnified": lambda v: CIRCLE.plot_magnified(factor=v),
-    "plot_loop": lambda v: FITS.plot_loop(v, RESPONSE),
-    "plot_loop run": lambda v: FITS.plot_loop(LOG, v),
-    "plot_time": lambda v: FITS.plot_time(v, RESPONSE),
-    "plot_time axes": lambda v: FITS.plot_time(LOG, RESPONSE, v),
-    "plot_time fitted_until": lambda v: FITS.plot_time(LOG, RESPONSE, fitted_until=v),
-    "plot_convergence": FITS.plot_convergence,
-    "plot_step": FITS.plot_step,
-    "plot_spectrum": FITS.plot_spectrum,
+    "IdentifiedModel.plot_loop": FIT.plot_loop,
+    "IdentifiedModel.plot_loop ax": lambda v: FIT.plot_loop(LOG, ax=v),
+    "IdentifiedModel.plot_time": FIT.plot_time,
     "LoopReport.plot fig": lambda v: pt.check_loop(PLAYS, BARE).plot(fig=v),
 }
 

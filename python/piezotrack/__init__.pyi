@@ -47,7 +47,7 @@ from .identification.campaigns.campaign import campaign as campaign
 from .identification.comparison.compare import compare as compare
 from .identification.experiments.step_response import identify_step as identify_step
 from .identification.fit import identify as identify
-from .identification.fitted.identified_model import load as load
+from .identification.fitted.model_file import load as load
 from .identification.methods.descents import Descents as Descents
 from .identification.methods.particle_swarm import ParticleSwarm as ParticleSwarm
 from .references.parse import parse_reference as parse_reference

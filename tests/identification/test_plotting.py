@@ -15,7 +15,6 @@ import piezotrack as pt
 from piezotrack._support.files import save_figures
 from piezotrack.identification.views.plot import (
     plot_convergence,
-    plot_identification,
     plot_loop,
     plot_response,
     plot_time,
@@ -124,7 +123,39 @@ def test_another_record_can_be_shown() -> None:
     assert np.allclose(y, 1e6 * other.y)
     score = fitted().score(other)
     assert f"({score.rms_percent:.3g} % of stroke)" in figure.axes[3].get_title()
-    assert len(plot_identification(fitted(), other).axes) == 4
+
+
+def test_a_model_from_a_file_is_drawn_on_a_record(tmp_path: Path) -> None:
+    log = quick()
+    model = pt.load(fitted().save(tmp_path / "model.json"))
+    run = model.simulate(log)
+    for ax, x in ((model.plot_loop(log), log.u), (model.plot_time(log)[0], log.t)):
+        drawn_x, drawn_y = points(ax, 1)
+        assert np.allclose(drawn_x, x, rtol=1e-12)
+        assert np.allclose(drawn_y, 1e6 * run.x, rtol=1e-12)
+    # Without a search there is no convergence; and this record is the one that was fitted.
+    figure = model.plot(log)
+    assert len(figure.axes) == 3
+    assert "not fitted" not in figure.get_suptitle()
+    assert "not fitted" in model.plot(quick(5)[1.0:3.0]).get_suptitle()
+    for draw in (model.plot, model.plot_loop, model.plot_time):
+        with pytest.raises(pt.ParameterError, match="a model from a file has none"):
+            draw()
+    assert f"{model.model.mass:.6g}" in model.summary()
+
+
+def test_panels_of_a_fit_show_its_record() -> None:
+    run = fitted().simulate(quick(), offset=fitted().offset)
+    assert np.allclose(points(fitted().plot_loop(), 1)[1], 1e6 * run.x, rtol=1e-12)
+    assert np.allclose(points(fitted().plot_time()[0], 1)[1], 1e6 * run.x, rtol=1e-12)
+    drawn = points(fitted().plot_convergence(), 0)[1]
+    assert np.allclose(drawn, 1e6 * fitted().history, rtol=1e-12)
+
+
+def test_a_fit_by_least_squares_has_no_convergence() -> None:
+    fit = pt.identify(quick(), "prandtl-ishlinskii", progress=False)
+    with pytest.raises(pt.ParameterError, match="least squares"):
+        fit.plot_convergence()
 
 
 @pytest.mark.parametrize(

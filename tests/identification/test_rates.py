@@ -70,12 +70,12 @@ def test_a_mass_that_is_asked_for_is_searched() -> None:
 def test_use_beyond_the_record_is_remarked() -> None:
     fit = pt.identify(SLOW, "prandtl-ishlinskii")
     u = SLOW.u
-    assert fit.beyond_fit(u, SLOW.dt) == []
-    assert "that of the record identified from" in fit.beyond_fit(1.2 * u, SLOW.dt)[0]
-    (rate,) = fit.beyond_fit(u, 0.1 * SLOW.dt)
+    assert fit.extrapolation_notes(u, SLOW.dt) == []
+    assert "that of the record identified from" in fit.extrapolation_notes(1.2 * u, SLOW.dt)[0]
+    (rate,) = fit.extrapolation_notes(u, 0.1 * SLOW.dt)
     assert "V/s" in rate
     assert fit.score(record(10.0, rate=5000.0)).notes == (
-        fit.beyond_fit(record(10.0, rate=5000.0).u, 1 / 5000)[0],
+        fit.extrapolation_notes(record(10.0, rate=5000.0).u, 1 / 5000)[0],
     )
 
 

@@ -469,6 +469,19 @@ def test_the_picture_has_peaks_and_units() -> None:
 # The command.
 
 
+def test_what_is_saved_is_the_document_and_a_picture_where_there_is_a_record(
+    tmp_path: Path,
+) -> None:
+    step = pt.identify_step(step_log(1))
+    written = step.save(tmp_path / "record")
+    assert [path.name for path in written] == ["step.json", "step.png", "step.svg"]
+    saved = json.loads(written[0].read_text())
+    assert saved == json.loads(json.dumps(step.document()))
+    assert saved["readings"]["frequency"] == step.readings.frequency
+    by_hand = pt.identify_step(step.readings).save(tmp_path / "by hand")
+    assert [path.name for path in by_hand] == ["step.json"]
+
+
 def test_the_command(tmp_path: Path) -> None:
     log = step_log(1)
     file = tmp_path / "step.csv"

@@ -17,7 +17,7 @@ from piezotrack.xu_li_2010.apparatus import Apparatus, calibration_file
 from piezotrack.xu_li_2010.free_parameters import FREE, apparatus_at
 from piezotrack.xu_li_2010.measured_log import drives
 from piezotrack.xu_li_2010.published import Observable, Obtained, Use, observables
-from piezotrack.xu_li_2010.report_text import tally
+from piezotrack.xu_li_2010.views.report_text import tally
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -6,8 +6,8 @@ import matplotlib.pyplot as plt
 import pytest
 from matplotlib.patches import Patch
 
-from piezotrack.xu_li_2010.block_diagrams import draw
-from piezotrack.xu_li_2010.report_files import LINES, TYPE, pages
+from piezotrack.xu_li_2010.views.block_diagrams import draw
+from piezotrack.xu_li_2010.views.report_files import LINES, TYPE, pages
 
 
 def block(name: str, count: int) -> list[str]:

@@ -24,6 +24,7 @@ __all__ = [
     "drive_text",
     "drive_word",
     "known_units",
+    "length_text",
     "lookup",
     "of_drive",
     "require",
@@ -278,6 +279,33 @@ def best_length_unit(stroke_m: float) -> tuple[str, float]:
     if not math.isfinite(size) or size == 0.0 or 1e-6 <= size < 1e-3:
         return "um", 1e6
     return ("nm", 1e9) if size < 1e-6 else ("mm", 1e3)
+
+
+def length_text(metres: float) -> str:
+    """Write a length in the unit in which it is easy to read.
+
+    Parameters
+    ----------
+    metres : float
+        The length [m].
+
+    Returns
+    -------
+    str
+        With four digits.
+
+    Examples
+    --------
+    >>> length_text(45.678e-6), length_text(40.0)
+    ('45.68 um', '40 m')
+    """
+    size = abs(metres)
+    if size >= 1.0:
+        return f"{metres:.4g} m"
+    if 0.0 < size < 1e-9:
+        return f"{1e12 * metres:.4g} pm"
+    unit, scale = best_length_unit(metres)
+    return f"{scale * metres:.4g} {unit}"
 
 
 def of_drive(unit: str, drive: str) -> str:

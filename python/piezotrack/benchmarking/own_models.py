@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from ..data.dataset import Dataset
     from ..identification.fitted.identification import Identification
-    from ..stages.base import StageState
+    from ..stages.motion import StageState
     from .record import BenchmarkRecord
 
     Array = NDArray[np.float64]

@@ -77,7 +77,7 @@ def compare_controllers_command(
     from ..control.timing import Timing
     from ..control.tuning.goal import TuningSearch
     from ..control.tuning.margins import Margins
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
 
     own = stage != PAPER
     refuse_of_other_stage(context, own)

@@ -46,7 +46,7 @@ def _measured(result: Output, seed: int) -> None:
     """Run the demonstration on the two measured logs of the package."""
     from .._support.files import make_folder, picture_files, save_figures, together
     from ..data.log_file import write_log
-    from ..identification.views.plot import plot_loop, plot_time, what_was_not_fitted
+    from ..identification.views.plot import plot_loop, plot_time, what_was_shown
     from ..identification.views.report import identification_files, save_identification
     from .demonstration import run_demo
     from .demonstration_plot import plot_before_and_after
@@ -57,7 +57,7 @@ def _measured(result: Output, seed: int) -> None:
     found = run_demo(seed, progress=result.progress)
     fit, other = found.fit, found.other
     run = fit.simulate(other)
-    title = what_was_not_fitted(fit, other, run)
+    title = what_was_shown(fit, other, run)
     figures = (
         plot_loop(other, run, title=title).figure,
         plot_time(other, run, stroke=fit.stroke, title=title)[0].figure,

@@ -333,7 +333,7 @@ def fit_options(
 def _least_squares(
     plays: int | None, asymmetry: int | None, dynamics: str | None, creep: bool | list[float] | None
 ) -> Any:
-    from ..identification.solve.weights import LeastSquares
+    from ..identification.methods.least_squares import LeastSquares
 
     settings: dict[str, Any] = {}
     if plays is not None:

@@ -245,14 +245,14 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
 def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]:
     """Write the model and the pictures, those of a second log too."""
     from .._support.files import make_folder, save_figures, together
-    from ..identification.views.plot import plot_loop, plot_time, what_was_not_fitted
+    from ..identification.views.plot import plot_loop, plot_time, what_was_shown
     from ..identification.views.report import save_identification
 
     name = fit.model.info.name
     figures = {}
     if second is not None:
         run = fit.simulate(second)
-        title = what_was_not_fitted(fit, second, run)
+        title = what_was_shown(fit, second, run)
         axes = (
             plot_loop(second, run, title=title),
             plot_time(second, run, stroke=fit.stroke, title=title)[0],

@@ -131,7 +131,7 @@ def learn_command(
     from ..control.controller.controller import Controller
     from ..control.learning.learn import learn
     from ..control.timing import Timing
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
 
     own = stage != PAPER
     settings = Loop(own, dt, limits, feedback, kp, ti, td)

@@ -295,10 +295,10 @@ def small_margins(loop: LoopCheck) -> list[str]:
 
 def drive_notes(model: IdentifiedModel, run: Tracking) -> list[str]:
     """Remarks on a run beyond the range or the rate of the record identified."""
-    notes = model.beyond_fit(run.voltage)
+    notes = model.extrapolation_notes(run.voltage)
     if run.controller.feedforward is not None:
         # The rate of the feedforward: a loop's voltage has the noise of the sensor.
-        rate = model.beyond_fit(run.feedforward, run.controller.dt)
+        rate = model.extrapolation_notes(run.feedforward, run.controller.dt)
         notes += [note for note in rate if note not in notes and " moves at " in note]
     return notes
 
@@ -309,7 +309,7 @@ def simulated(
     """Make the stage of `StageFile`, with the noise [m] of a sensor and a bandwidth [Hz]."""
     from pathlib import Path
 
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
     from ..stages.virtual import VirtualStage
 
     if stage == PAPER:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -23,9 +22,6 @@ from .options import (
     windowed,
 )
 from .output import Output
-
-if TYPE_CHECKING:
-    from ..identification.experiments.sensor_noise import Noise
 
 __all__ = ["noise_command"]
 
@@ -52,13 +48,7 @@ def noise_command(
 
     Its rms, resolution and spectrum, and a model of it.
     """
-    from .._support.files import (
-        make_folder,
-        picture_files,
-        save_figures,
-        together,
-        write_document,
-    )
+    from .._support.files import picture_files
     from ..data.reader import read_displacement
     from ..identification.experiments.sensor_noise import identify_noise
 
@@ -71,29 +61,5 @@ def noise_command(
     log = windowed(log, file, "--window", window)
     with of_file(file):
         found = identify_noise(log)
-    document = _document(found)
-    with together(make_folder(out)) as folder:
-        written = [write_document(folder / "noise.json", document)]
-        written += save_figures({"noise": found.plot()}, folder)
-    result.show(found.summary(), document, written)
-
-
-def _document(found: Noise) -> dict[str, Any]:
-    """Content of the JSON file."""
-    from .. import __version__
-
-    return {
-        "format": "piezotrack-noise",
-        "schema_version": 1,
-        "unit": "m, Hz",
-        "spread": asdict(found.spread),
-        "drift": found.drift,
-        "resolution": found.resolution,
-        "levels": found.levels,
-        "noise": found.noise,
-        # JSON has no infinity.
-        "bandwidth": None if found.bandwidth_sd is None else found.bandwidth,
-        "bandwidth_sd": found.bandwidth_sd,
-        "data": {"source": found.data.source, "sha256": found.data.sha256},
-        "provenance": {"package": "piezotrack", "version": __version__},
-    }
+    written = found.save(out)
+    result.show(found.summary(), found.document(), written)

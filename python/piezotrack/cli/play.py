@@ -44,7 +44,7 @@ def play_command(
     from .._support.files import picture_files
     from ..control.controller.load import load_controller
     from ..control.on_device.playing import play
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
 
     forward = load_controller(file) if rate is None else load(file).inverse()
     desired = parsed_reference(reference, duration, period)

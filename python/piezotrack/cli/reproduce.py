@@ -41,8 +41,7 @@ def reproduce_command(
 
     On a simulated stage, with a report as HTML, PDF and JSON.
     """
-    from ..xu_li_2010.report_files import REPORT
-    from ..xu_li_2010.reproduction import reproduce
+    from ..xu_li_2010.reproduction import REPORT, reproduce
 
     if quick:
         refuse_without_effect(context, ("seeds",), "with --quick")

@@ -51,7 +51,7 @@ def simulate_command(
         write_columns,
     )
     from .._support.units import drive_word, shown_unit
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
     from ..identification.views.plot import plot_response
 
     known = load(model)
@@ -83,7 +83,7 @@ def simulate_command(
             drive_unit=known.drive_unit,
         )
         written += save_figures({"simulated": picture}, folder)
-    remarks = known.beyond_fit(u, interval)
+    remarks = known.extrapolation_notes(u, interval)
     words = (
         f"{t.size} samples from rest at {scale * u[0]:.4g} {name}, drive from "
         f"{scale * u.min():.4g} to {scale * u.max():.4g} {name}: displacement "

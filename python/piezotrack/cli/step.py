@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -28,9 +27,6 @@ from .options import (
     windowed,
 )
 from .output import Output
-
-if TYPE_CHECKING:
-    from ..identification.experiments.step_response import StepResult
 
 __all__ = ["step_command"]
 
@@ -69,13 +65,7 @@ def step_command(
 
     And the hysteresis parameters of the Dahl model, as in section 3.3 of Xu and Li 2010.
     """
-    from .._support.files import (
-        make_folder,
-        picture_files,
-        save_figures,
-        together,
-        write_document,
-    )
+    from .._support.files import picture_files
     from ..identification.experiments.step_response import identify_step
 
     log = Columns(time, drive, displacement, unit, dt).read(file, hold, resample)
@@ -85,32 +75,10 @@ def step_command(
     level = None if second_level is None else _level(second_level)
     with of_file(file):
         step = identify_step(log, stiffness=stiffness, mass=mass, second_level=level)
-    document = _document(step)
-    with together(make_folder(out)) as folder:
-        written = [write_document(folder / "step.json", document)]
-        written += save_figures({"step": step.plot()}, folder)
+    written = step.save(out)
     options = " ".join(f"--fix {name}={value:.8g}" for name, value in step.hysteresis.items())
     hint = f"to hold these in a search: piezotrack identify LOG --model dahl {options}"
-    result.show(f"{step.summary()}\n\n{hint}", document, written)
-
-
-def _document(step: StepResult) -> dict[str, Any]:
-    """Content of the JSON file: readings and results, SI."""
-    from .. import __version__
-
-    return {
-        "format": "piezotrack-step",
-        "schema_version": 1,
-        "unit": "V, m, s, Hz, rad/s; a1 1/m, a2 1/m^2, b1 N/m^2, b0 N/m",
-        "readings": asdict(step.readings),
-        "natural_angular_frequency": step.natural_angular_frequency,
-        "damping_ratio": step.damping_ratio,
-        "damping_by_decrement": step.damping_by_decrement,
-        "time_constant": step.time_constant,
-        "hysteresis": step.hysteresis,
-        "ratios": step.ratios,
-        "provenance": {"package": "piezotrack", "version": __version__},
-    }
+    result.show(f"{step.summary()}\n\n{hint}", step.document(), written)
 
 
 def _level(text: str) -> tuple[float, float]:

@@ -154,7 +154,7 @@ def track_command(
     from ..control.loop.stability import check_loop
     from ..control.running.track import track
     from ..control.timing import Timing
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
 
     if device is not None:
         refuse_without_effect(context, SIMULATED, "with --device")
@@ -280,7 +280,7 @@ def feedforward_command(
     from ..control.loop.preconditions import check_within_reach
     from ..control.plant import plant_of
     from ..control.views.tracking_plot import plot_feedforward
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
 
     known = load(model)
     desired = parsed_reference(reference, duration, period)
@@ -309,7 +309,7 @@ def feedforward_command(
             samples.t, voltage, samples.x, title=title, drive_unit=known.drive_unit
         )
         written += save_figures({"feedforward": picture}, folder)
-    notes = known.beyond_fit(voltage, interval)
+    notes = known.extrapolation_notes(voltage, interval)
     lines = [
         f"{desired!r} at {1.0 / interval:g} Hz; {how}",
         f"{voltage.size} samples, {what} from {shown.min():.4g} to {shown.max():.4g} {unit}",

@@ -91,7 +91,7 @@ def tune_command(
     from ..control.tuning.goal import Goal, TuningSearch
     from ..control.tuning.margins import Margins, Spread
     from ..control.tuning.tune import tune
-    from ..identification.fitted.identified_model import load
+    from ..identification.fitted.model_file import load
     from ..stages.virtual import VirtualStage
 
     _within("--gain-margin", gain_margin, 1.0, math.inf, "a factor above 1")

@@ -25,7 +25,7 @@ class OwnStage:
     """The stage of one's own models: of x and y, or one for both."""
 
     def __init__(self, models: list[Path] | None, loops: tuple[Loop, Loop]) -> None:
-        from ..identification.fitted.identified_model import load
+        from ..identification.fitted.model_file import load
 
         files = models or []
         self._files = [files[0], files[-1]]
@@ -133,7 +133,7 @@ class PaperStage:
 
     def _inverse(self) -> Inverse:
         """Invert the model, or one identified as in the paper."""
-        from ..identification.fitted.identified_model import load
+        from ..identification.fitted.model_file import load
         from ..xu_li_2010.demo import demo_log, identify_demo
 
         if self._file is not None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from .._support.arrays import signal_of, time_axis
 from .._support.frames import frame_of
 from .._support.messages import quoted
+from .._support.result import Viewed
+from .._support.units import best_length_unit
 from ..errors import DataError, ParameterError
 from .dataset_arguments import (
     MIN_SAMPLES,
@@ -18,14 +20,12 @@ from .dataset_arguments import (
     interpolation_factor,
     window_samples,
 )
-from .views.dataset_text import as_line, as_table
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
 
     from .frames import Frame
@@ -37,7 +37,7 @@ __all__ = ["Dataset", "Hold"]
 Hold = Literal["foh", "zoh"]
 
 
-class Dataset:
+class Dataset(Viewed):
     """An evenly sampled record of one axis, in seconds, volts and metres.
 
     Parameters
@@ -98,6 +98,11 @@ class Dataset:
     >>> log.cut(3.0, 23.0).warmup
     0
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "plot": "data.views.dataset_plot:plot_dataset",
+        "html": "data.views.dataset_table:dataset_html",
+    }
 
     def __init__(
         self,
@@ -170,16 +175,24 @@ class Dataset:
         >>> pt.Dataset.from_frame(frame)
         Dataset(3 samples, 0.015 s at 200 Hz, stroke 3.5 um)
         """
-        from .frames import dataset_of_frame
+        from .frames import signals_of_frame
 
-        return dataset_of_frame(
+        signals, drive_unit = signals_of_frame(
             frame,
             time=time,
             drive=drive,
             displacement=displacement,
             units=units,
+            needs_time=dt is None,
+        )
+        return cls(
+            u=signals["drive"],
+            y=signals["displacement"],
+            t=signals.get("time"),
             dt=dt,
             hold=hold,
+            drive_unit=drive_unit,
+            source="data frame",
         )
 
     def to_frame(self) -> Any:
@@ -395,7 +408,7 @@ class Dataset:
         from .rates import at_lower_rate
 
         factor = decimation_factor(factor, len(self))
-        less = at_lower_rate(self.full, factor, self._start % factor)
+        less = self._resampled(*at_lower_rate(self._t, factor, self._start % factor))
         return less._part(0, len(less), start=self._start // factor)
 
     def interpolate(self, factor: int) -> Dataset:
@@ -438,8 +451,22 @@ class Dataset:
         from .rates import at_higher_rate
 
         factor = interpolation_factor(factor, self._t.size, self._hold)
-        fine = at_higher_rate(self.full, factor)
+        fine = self._resampled(*at_higher_rate(self._t, self._dt, factor))
         return fine._part(0, len(fine), start=self._start * factor)
+
+    def _resampled(self, times: Array, change: Callable[[Array], Array]) -> Dataset:
+        """Change all signals and the warm-up; the drive then goes straight between samples."""
+        return Dataset(
+            u=change(self._u),
+            y=change(self._y),
+            t=times,
+            hold="foh",
+            drive_unit=self._drive_unit,
+            columns={name: change(values) for name, values in self._columns.items()},
+            column_units=self._column_units,
+            source=self._source,
+            notes=self._notes,
+        )
 
     def _samples(self, start: float | None, stop: float | None) -> tuple[int, int]:
         """Turn the bounds of a window [s] into indices of the arrays."""
@@ -455,36 +482,16 @@ class Dataset:
         part._start, part._sha256 = start, None
         return part
 
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Drive and displacement over time, and the hysteresis loop.
-
-        Parameters
-        ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-
-        Examples
-        --------
-        >>> import piezotrack as pt
-        >>> from matplotlib.figure import Figure
-        >>> figure = pt.datasets.dbo_training()[3.0:23.0].plot(fig=Figure())
-        >>> [ax.get_ylabel() for ax in figure.axes]
-        ['drive [V]', 'displacement [um]', 'displacement [um]']
-        """
-        from .views.dataset_plot import plot_dataset
-
-        return plot_dataset(self, fig)
-
     def __repr__(self) -> str:
-        return as_line(self)
-
-    def _repr_html_(self) -> str:
-        return as_table(self)
+        unit, scale = best_length_unit(self.stroke)
+        parts = [
+            f"{len(self)} samples",
+            f"{self.duration:.6g} s at {1.0 / self.dt:.6g} Hz",
+            f"stroke {self.stroke * scale:.3g} {unit}",
+        ]
+        if self.warmup:
+            parts.append(f"warm-up {self.warmup} samples")
+        return f"Dataset({', '.join(parts)})"
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

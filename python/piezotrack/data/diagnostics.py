@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.units import best_length_unit, drive_text
+from .._support.units import best_length_unit, drive_text, length_text
 from ..errors import DataError
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["JUMP", "TURN", "check_record", "fit_warnings", "record_warnings", "runs"]
+__all__ = ["check_record", "fit_warnings", "jumps", "record_warnings", "runs", "turns"]
 
 # A signal reverses where it goes back by this share of its range.
 TURN = 0.05
@@ -65,7 +65,7 @@ def check_record(data: Dataset, *, searches_hysteresis: bool) -> None:
     # Constant or too short records are refused by the core.
     if len(data) < FEWEST or not searches_hysteresis or _steps(whole.u) or np.ptp(whole.u) == 0.0:
         return
-    if not _turns(whole.u) and not _turns(whole.y):
+    if not turns(whole.u) and not turns(whole.y):
         raise DataError(
             f"the drive never reverses: it goes from {_drive(data, whole.u[0])} to "
             f"{_drive(data, whole.u[-1])} and never back, where hysteresis does not show; record a "
@@ -176,7 +176,8 @@ def _lopsided(data: Dataset) -> bool:
     return bool(counts.min() > 0 and np.sum(odd**2) > LOPSIDED * np.sum(width**2))
 
 
-def _turns(signal: Array) -> list[int]:
+def turns(signal: Array) -> list[int]:
+    """Return the samples at which a signal reverses by 5 % of its range or more."""
     return _core.turns(signal, TURN * float(np.ptp(signal)))
 
 
@@ -185,8 +186,12 @@ def _steps(u: Array) -> bool:
     if u.size < 2:
         return False
     moves = np.abs(np.diff(u))
-    most = float(moves.max())
-    return bool(most >= JUMP * np.ptp(u) or np.mean(moves > 0.01 * most) < 0.1)
+    return jumps(u) or bool(np.mean(moves > 0.01 * float(moves.max())) < 0.1)
+
+
+def jumps(u: Array) -> bool:
+    """Return whether a drive jumps by a fifth of its range or more from sample to sample."""
+    return bool(float(np.abs(np.diff(u)).max()) >= JUMP * np.ptp(u))
 
 
 def _seldom(data: Dataset) -> list[str]:
@@ -209,17 +214,17 @@ def _units(data: Dataset) -> list[str]:
             f"a drive of {most:.6g} V is not that of a piezo: is it in mV? It would be "
             f"{most / 1e3:.4g} V"
         ]
-    doubt = f"a stroke of {_length(stroke)} is not that of a nanopositioner"
+    doubt = f"a stroke of {length_text(stroke)} is not that of a nanopositioner"
     if stroke > LONGEST:
         factor = min((1e3, 1e6, 1e9), key=lambda f: abs(math.log(stroke / f / USUAL)))
         taken = {1e3: "um taken as mm", 1e6: "um taken as m", 1e9: "nm taken as m"}[factor]
         return [
             f"{doubt}: is the unit of the displacement right? It would be "
-            f"{_length(stroke / factor)} if it is {_power(factor)} too large, as {taken}"
+            f"{length_text(stroke / factor)} if it is {_power(factor)} too large, as {taken}"
         ]
     if gain > HIGHEST_GAIN:
         return [
-            f"{_length(stroke)} under {swing:.3g} V are {1e6 * gain:.3g} um/V, more than piezo "
+            f"{length_text(stroke)} under {swing:.3g} V are {1e6 * gain:.3g} um/V, more than piezo "
             f"stages give: is the drive in V and taken as mV, 1e3 too small, or the displacement "
             "1e3 too large?"
         ]
@@ -228,9 +233,9 @@ def _units(data: Dataset) -> list[str]:
         factor = min((1e3, 1e6), key=lambda f: abs(math.log(stroke * f / USUAL)))
         taken = {1e3: "um taken as nm", 1e6: "um taken as pm"}[factor]
         return [
-            f"{_length(stroke)} under {swing:.4g} V are {1e9 * gain:.3g} nm/V, less than piezo "
+            f"{length_text(stroke)} under {swing:.4g} V are {1e9 * gain:.3g} nm/V, less than piezo "
             f"stages give: is the unit of the displacement right? It would be "
-            f"{_length(stroke * factor)} if it is {_power(factor)} too small, as {taken}"
+            f"{length_text(stroke * factor)} if it is {_power(factor)} too small, as {taken}"
         ]
     return []
 
@@ -240,9 +245,9 @@ def _periods(data: Dataset) -> list[str]:
     u = data.u
     if _steps(u):
         return []
-    turning = len(_turns(u))
-    if turning == 0 and not _turns(data.full.u):
-        if _turns(data.y):
+    turning = len(turns(u))
+    if turning == 0 and not turns(data.full.u):
+        if turns(data.y):
             return []
         return ["the drive never reverses: this record does not determine the hysteresis"]
     open_end = abs(float(u[-1] - u[0])) > CLOSED * np.ptp(u)
@@ -291,7 +296,7 @@ def _clipping(data: Dataset) -> list[str]:
             further = max(float(part.max() - ends.max()), float(ends.min() - part.min()))
             if last - first >= 10 and further > TURN * swing:
                 warnings.append(
-                    f"the displacement stays at {_length(level)} while the drive goes "
+                    f"the displacement stays at {length_text(level)} while the drive goes "
                     f"{_drive(data, further, 3)} further and back: is the sensor or the "
                     "stage at its end?"
                 )
@@ -316,17 +321,6 @@ def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def _drive(data: Dataset, value: float, digits: int = 4) -> str:
     """Write a drive of a record with its unit."""
     return drive_text(value, data.drive_unit, digits)
-
-
-def _length(metres: float) -> str:
-    """Write a length in the unit in which it is easy to read."""
-    size = abs(metres)
-    if size >= 1.0:
-        return f"{metres:.4g} m"
-    if size < 1e-9:
-        return f"{1e12 * metres:.4g} pm"
-    unit, scale = best_length_unit(metres)
-    return f"{scale * metres:.4g} {unit}"
 
 
 def _power(factor: float) -> str:

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import _core
 from .._support.arrays import MOST_SAMPLES
 from .._support.statistics import sample_noise
-from .._support.units import best_length_unit, drive_text
-from .diagnostics import JUMP, TURN, runs
+from .._support.units import drive_text
+from .diagnostics import jumps, runs, turns
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +23,6 @@ __all__ = [
     "DriveFeatures",
     "TimeFeatures",
     "drive_features",
-    "length_text",
     "remarks",
     "reversals_text",
     "time_features",
@@ -174,13 +172,13 @@ def drive_features(t: Array, u: Array, y: Array | None, unit: str) -> DriveFeatu
     """
     low, high = float(u.min()), float(u.max())
     swing = high - low
-    places = _core.turns(u, TURN * swing) if swing > 0.0 else []
+    places = turns(u) if swing > 0.0 else []
     between = np.abs(np.diff(u[places]))
     lasting = np.diff(t[places])
     large = (
         lasting[(between >= SMALL * between.max()) & (lasting > 0.0)] if between.size else lasting
     )
-    jumps = swing > 0.0 and bool(np.abs(np.diff(u)).max() >= JUMP * swing)
+    steps = swing > 0.0 and jumps(u)
     return DriveFeatures(
         unit=unit,
         low=low,
@@ -190,8 +188,8 @@ def drive_features(t: Array, u: Array, y: Array | None, unit: str) -> DriveFeatu
         swings=(float(between.min()), float(between.max())) if between.size else (),
         frequencies=(0.5 / float(large.max()), 0.5 / float(large.min())) if large.size else (),
         rests=_rests(t, u, places),
-        steps=jumps,
-        mode_limit=_mode_limit(t, y, between / swing, lasting, jumps),
+        steps=steps,
+        mode_limit=_mode_limit(t, y, between / swing, lasting, steps),
     )
 
 
@@ -226,7 +224,7 @@ def _rests(t: Array, u: Array, places: list[int]) -> tuple[tuple[float, float, f
     return tuple(found)
 
 
-def _mode_limit(t: Array, y: Array | None, shares: Array, lasting: Array, jumps: bool) -> float:
+def _mode_limit(t: Array, y: Array | None, shares: Array, lasting: Array, steps: bool) -> float:
     """Return the natural frequency [Hz] up to which inertia moves the sensor visibly.
 
     At f Hz a mode of fn Hz changes a motion by (f/fn)^2 of it, which has to be more than the noise.
@@ -235,7 +233,7 @@ def _mode_limit(t: Array, y: Array | None, shares: Array, lasting: Array, jumps:
         return math.nan
     interval = float(np.median(np.diff(t)))
     rate = 1.0 / interval if interval > 0.0 else math.nan
-    if jumps:
+    if steps:
         return HIGHEST * rate
     if not shares.size or np.ptp(y) == 0.0:
         return 0.0
@@ -363,12 +361,6 @@ def _of_rests(time: TimeFeatures, drive: DriveFeatures) -> str:
 
 def _drive(value: float, drive: DriveFeatures) -> str:
     return drive_text(value, drive.unit, 4)
-
-
-def length_text(metres: float) -> str:
-    """Write a length in the unit in which it is easy to read."""
-    unit, scale = best_length_unit(metres)
-    return f"{scale * metres:.4g} {unit}"
 
 
 def reversals_text(drive: DriveFeatures) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from .._support.files import replacing, write_columns
 from .._support.messages import quoted
@@ -16,17 +16,41 @@ from .formats.table import WrittenColumn
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Mapping
 
     import numpy as np
     from numpy.typing import NDArray
 
-    from .dataset import Dataset
     from .formats.table import Format
+
+    Array = NDArray[np.float64]
 
 __all__ = ["format_to_write", "save_log", "write_log"]
 
 
-def write_log(log: Dataset, path: Path) -> Path:
+class Signals(Protocol):
+    """A record as it is written."""
+
+    @property
+    def t(self) -> Array: ...
+
+    @property
+    def u(self) -> Array: ...
+
+    @property
+    def y(self) -> Array: ...
+
+    @property
+    def drive_unit(self) -> str: ...
+
+    @property
+    def columns(self) -> Mapping[str, Array]: ...
+
+    @property
+    def column_units(self) -> Mapping[str, str]: ...
+
+
+def write_log(log: Signals, path: Path) -> Path:
     """Write a log as a CSV file for `read`.
 
     Parameters
@@ -46,7 +70,7 @@ def write_log(log: Dataset, path: Path) -> Path:
     )
 
 
-def save_log(log: Dataset, path: str | os.PathLike[str]) -> Path:
+def save_log(log: Signals, path: str | os.PathLike[str]) -> Path:
     """Write a log in the format of the file's ending: see `Dataset.save`."""
     try:
         file = Path(path)
@@ -77,12 +101,12 @@ def format_to_write(file: Path) -> Format:
     raise ParameterError(f"{file.name}: expected an ending of a format that is written: {endings}")
 
 
-def _drive(log: Dataset) -> WrittenColumn:
+def _drive(log: Signals) -> WrittenColumn:
     name = drive_word(log.drive_unit)
     return WrittenColumn(name, log.drive_unit, log.u, f"{name}_{log.drive_unit}")
 
 
-def _further(name: str, unit: str, values: NDArray[np.float64]) -> WrittenColumn:
+def _further(name: str, unit: str, values: Array) -> WrittenColumn:
     """Give a further column a title from which a reader gets its name and unit."""
     plain = re.sub(r"\s+", " ", name)
     bare = split_unit(plain)[0]

@@ -12,13 +12,14 @@ import numpy as np
 
 from .._support.arrays import check_dt, time_fault
 from .._support.messages import quoted
-from .._support.units import drive_text, drive_word, lookup
+from .._support.table import Column as Cells
+from .._support.table import Table
+from .._support.units import drive_text, drive_word, length_text, lookup
 from ..errors import DataError, ParameterError, PiezotrackError
 from .drive_features import (
     DriveFeatures,
     TimeFeatures,
     drive_features,
-    length_text,
     remarks,
     reversals_text,
     time_features,
@@ -120,17 +121,28 @@ class LogInfo:
             Several lines.
         """
         width = min(60, max(len(_shown(column.title)) for column in self.columns))
-        lines = [
-            f"{self.source}  {self.format}, {len(self.columns)} columns",
-            "",
-            f"{'column':<{width}}  {'unit':<5}  {'samples':>8}  {'lowest':>11}  {'highest':>11}",
-        ]
-        for column in self.columns:
-            lost = f"  {column.missing} not finite" if column.missing else ""
-            lines.append(
-                f"{_shown(column.title):<{width}}  {_shown(column.unit) or '-':<5}  "
-                f"{column.samples:>8}  {column.low:>11.6g}  {column.high:>11.6g}{lost}"
-            )
+        table = Table(
+            (
+                Cells("column", width=width, before=0, left=True),
+                Cells("unit", width=5, left=True),
+                Cells("samples", width=8),
+                Cells("lowest", format=".6g", width=11),
+                Cells("highest", format=".6g", width=11),
+                Cells(left=True),
+            ),
+            [
+                (
+                    _shown(column.title),
+                    _shown(column.unit) or "-",
+                    column.samples,
+                    column.low,
+                    column.high,
+                    f"{column.missing} not finite" if column.missing else "",
+                )
+                for column in self.columns
+            ],
+        )
+        lines = [f"{self.source}  {self.format}, {len(self.columns)} columns", "", *table.lines()]
         lines += ["", *self._of_time(), *self._of_drive()]
         if self.determines:
             lines += ["", "can determine", *(f"  {text}" for text in self.determines)]

@@ -1,4 +1,4 @@
-"""Records at a lower and at a higher sampling rate."""
+"""Signals at a lower and at a higher sampling rate, with their times."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .dataset import Dataset
 from .resampling import interpolated, low_passed
 
 if TYPE_CHECKING:
@@ -19,30 +18,12 @@ if TYPE_CHECKING:
 __all__ = ["at_higher_rate", "at_lower_rate"]
 
 
-def at_lower_rate(whole: Dataset, factor: int, first: int) -> Dataset:
-    """Return every factor-th sample from `first` on, low-pass filtered before."""
-    return _changed(
-        whole, whole.t[first::factor], lambda signal: low_passed(signal, factor)[first::factor]
-    )
+def at_lower_rate(t: Array, factor: int, first: int) -> tuple[Array, Callable[[Array], Array]]:
+    """Return every factor-th time from `first` on, and what filters and thins a signal."""
+    return t[first::factor], lambda signal: low_passed(signal, factor)[first::factor]
 
 
-def at_higher_rate(whole: Dataset, factor: int) -> Dataset:
-    """Return a record with samples inserted between the given ones."""
-    count = (len(whole) - 1) * factor + 1
-    times = whole.t[0] + np.arange(count) * (whole.dt / factor)
-    return _changed(whole, times, lambda signal: interpolated(signal, factor))
-
-
-def _changed(whole: Dataset, times: Array, change: Callable[[Array], Array]) -> Dataset:
-    """Change all signals of a record, whose drive then goes straight from sample to sample."""
-    return Dataset(
-        u=change(whole.u),
-        y=change(whole.y),
-        t=times,
-        hold="foh",
-        drive_unit=whole.drive_unit,
-        columns={name: change(values) for name, values in whole.columns.items()},
-        column_units=whole.column_units,
-        source=whole.source,
-        notes=whole.notes,
-    )
+def at_higher_rate(t: Array, dt: float, factor: int) -> tuple[Array, Callable[[Array], Array]]:
+    """Return times with others inserted between them, and what interpolates a signal."""
+    count = (t.size - 1) * factor + 1
+    return t[0] + np.arange(count) * (dt / factor), lambda signal: interpolated(signal, factor)

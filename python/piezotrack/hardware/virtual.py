@@ -11,7 +11,7 @@ from .. import _core
 from .._support.arguments import finite, not_negative
 from .._support.arrays import signal_of
 from ..errors import DeviceError, ParameterError
-from ..identification.fitted.identified_model import load
+from ..identification.fitted.model_file import load
 from ..stages.virtual import VirtualStage
 from .device import Rates, Record
 from .limits import check_within, ordered

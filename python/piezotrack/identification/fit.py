@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from .fitted.identification import Identification
     from .fitted.start import History
     from .methods.descents import Descents
+    from .methods.least_squares import LeastSquares
     from .methods.particle_swarm import ParticleSwarm
     from .problem.records import Asked
-    from .solve.weights import LeastSquares
 
     Delay = bool | float | tuple[float, float] | None
     Drift = bool | float | None

@@ -7,10 +7,7 @@ from .asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStag
 from .asymmetric_prandtl_ishlinskii import (
     AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
 )
-from .base import ForceState as ForceState
-from .base import Response as Response
 from .base import Stage as Stage
-from .base import StageState as StageState
 from .bouc_wen import BoucWenStage as BoucWenStage
 from .bouc_wen import BoucWenState as BoucWenState
 from .bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
@@ -28,6 +25,9 @@ from .inverse import PlayedVoltage as PlayedVoltage
 from .lugre import LuGreStage as LuGreStage
 from .lugre import LuGreState as LuGreState
 from .maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
+from .motion import ForceState as ForceState
+from .motion import Response as Response
+from .motion import StageState as StageState
 from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
 from .parallel_dahl import ParallelDahlState as ParallelDahlState
 from .polynomial_prandtl_ishlinskii import (

@@ -1,9 +1,8 @@
-"""Base class of the stage models, their states and their response."""
+"""Base class of the stage models."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
 
@@ -14,8 +13,8 @@ from .._core import Stage as CoreStage
 from .._support.arguments import as_numbers, one_or_more_numbers
 from ..errors import ParameterError
 from .inverse import Inverse
-from .model_info import LISTED, ModelInfo, Parameter
-from .stage_text import stage_text
+from .model_info import LISTED, ModelInfo
+from .motion import Response, numbers_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -23,16 +22,14 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from ..data.dataset import Hold
+    from .motion import Named, StageState
 
     Array = NDArray[np.float64]
 
 __all__ = [
     "MODEL_STEP",
-    "ForceState",
     "Ratio",
-    "Response",
     "Stage",
-    "StageState",
     "mechanical_ratios",
     "stage",
 ]
@@ -41,97 +38,7 @@ __all__ = [
 MODEL_STEP = 5e-5
 # Parameter, symbol, value and unit.
 Ratio = tuple[str, str, float, str]
-# Names and numbers, as the core takes and gives them.
-Named = list[tuple[str, list[float]]]
 Method = Literal["exponential", "rk4", "rk45"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class StageState:
-    """State of a stage at one instant; each model adds the memory of its hysteresis.
-
-    Parameters
-    ----------
-    x : float
-        Displacement [m].
-    v : float
-        Velocity [m/s].
-    creep : tuple of float
-        State q of each relaxation of the creep [m].
-    """
-
-    x: float = 0.0
-    v: float = 0.0
-    creep: tuple[float, ...] = ()
-
-    @property
-    def _named(self) -> Named:
-        """Names and numbers of the state."""
-        return [(one.name, _entries(one.name, getattr(self, one.name))) for one in fields(self)]
-
-    @classmethod
-    def _from(cls, named: Iterable[tuple[str, list[float]]], parts: Iterable[Parameter]) -> Self:
-        lists = {part.name for part in parts if part.is_list}
-        given: dict[str, Any] = {
-            name: tuple(numbers) if name in lists else numbers[0] for name, numbers in named
-        }
-        return cls(**given)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ForceState(StageState):
-    """State of a stage whose hysteresis is a force in feedback on the displacement.
-
-    Parameters
-    ----------
-    force : float
-        Hysteresis force [N].
-    """
-
-    force: float = 0.0
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Response:
-    """Motion of a stage at the samples of its drive.
-
-    Attributes
-    ----------
-    t : ndarray, shape (n,)
-        Time [s], from 0 on.
-    u : ndarray, shape (n,)
-        Drive [V], or [N] for a model that is driven by a force.
-    x : ndarray, shape (n,)
-        Displacement [m].
-    v : ndarray, shape (n,)
-        Velocity [m/s]; 0 where the model has no mechanics.
-    hysteresis : ndarray, shape (n,)
-        Hysteresis force [N]; where the hysteresis is at the input its output, before creep and
-        dynamics [m].
-    final : StageState
-        State of the model at the last sample; ``initial=final`` continues from there.
-    substeps : int
-        Steps of the integrator in each sampling interval.
-    error_estimate : float
-        Largest change of `x` from a simulation with half the steps [m]; the error of `x` is about
-        a third of it with the scheme of second order, a fifteenth with that of fourth. With
-        plays at the input 0 where the model is exact, and a bound of the error where its envelopes
-        bend.
-    unique : bool
-        Whether the solution is unique. False if a `DahlStage` with `b0` other than 0 was at rest
-        with b0 q2 < 0 and a force smaller than that term: another motion then satisfies the same
-        drive.
-    """
-
-    t: Array
-    u: Array
-    x: Array
-    v: Array
-    hysteresis: Array
-    final: Any
-    substeps: int
-    error_estimate: float
-    unique: bool
 
 
 class Stage:
@@ -164,7 +71,7 @@ class Stage:
         cls.__repr__ = Stage.__repr__  # type: ignore[method-assign]
 
     def __repr__(self) -> str:
-        return stage_text(self)
+        return _stage_text(self)
 
     def __post_init__(self) -> None:
         for one in self.info.parameters:
@@ -217,7 +124,7 @@ class Stage:
     @property
     def _named(self) -> Named:
         """Names and numbers of the parameters."""
-        return [(name, _entries(name, getattr(self, name))) for name in self.parameter_names()]
+        return [(name, numbers_of(name, getattr(self, name))) for name in self.parameter_names()]
 
     def simulate(
         self,
@@ -451,10 +358,71 @@ def mechanical_ratios(stage: Any, damping: str, mass: str) -> list[Ratio]:
     ]
 
 
-def _entries(name: str, value: object) -> list[float]:
-    """Return the numbers of a parameter as a list: one, none or several."""
-    if value is None:
-        return []
-    if isinstance(value, (tuple, list)):
-        return list(as_numbers(name, value))
-    return [_core.as_number(name, value)]
+def _stage_text(stage: Stage) -> str:
+    """Write the gain, the hysteresis and the dynamics of a stage, in um and ms.
+
+    Parameters
+    ----------
+    stage : Stage
+        The stage.
+
+    Returns
+    -------
+    str
+        Such as ``PrandtlIshlinskiiStage(12.6 um/V, 10 plays, lag 1.2 ms)``. All parameters are
+        attributes of the stage, and ``dataclasses.asdict(stage)`` has them in a dict.
+    """
+    parts = _with_mass(stage) if hasattr(stage, "stiffness") else _at_the_input(stage)
+    if creep := len(stage.creep_times):  # type: ignore[attr-defined]
+        parts.append(_count(creep, "creep time"))
+    return f"{type(stage).__name__}({', '.join(parts)})"
+
+
+def _at_the_input(stage: Any) -> list[str]:
+    parts = []
+    thresholds = getattr(stage, "thresholds", None)
+    if thresholds is not None:
+        # With an envelope or a polynomial the slope depends on the voltage.
+        if hasattr(stage, "linear") and not hasattr(stage, "scale"):
+            parts.append(f"{1e6 * _mean_slope(stage):.3g} um/V")
+        parts.append(_count(len(thresholds), "play"))
+    for name, thing in (("dead_zone_weights", "dead zone"), ("levels", "level")):
+        if count := len(getattr(stage, name, ())):
+            parts.append(_count(count, thing))
+    if hasattr(stage, "low"):
+        parts.append(f"{stage.low:.4g} V to {stage.high:.4g} V")
+    if stage.time_constant is not None:
+        parts.append(f"lag {1e3 * stage.time_constant:.3g} ms")
+    if stage.frequency is not None:
+        parts.append(f"mode {stage.frequency:.4g} Hz")
+    if modes := len(stage.mode_frequencies):
+        parts.append(_count(modes, "further mode"))
+    return parts
+
+
+def _mean_slope(stage: Any) -> float:
+    """Travel per volt of the settled loop over a drive for which all plays are meant [m/V]."""
+    widest = 2.0 * max(stage.thresholds, default=0.0)
+    # A play follows the drive but for twice its threshold.
+    plays = zip(stage.thresholds, stage.weights, strict=True)
+    moved = (weight * (1.0 - 2.0 * r / widest if widest else 1.0) for r, weight in plays)
+    return float(stage.linear + math.fsum(moved))
+
+
+def _with_mass(stage: Any) -> list[str]:
+    parts = []
+    if stage.info.drive_unit == "V":
+        per_volt = stage.piezo_coefficient
+        in_metres = next(one.unit == "m/V" for one in stage.info.parameters
+                         if one.name == "piezo_coefficient")  # fmt: skip
+        parts.append(f"{1e6 * (per_volt if in_metres else per_volt / stage.stiffness):.3g} um/V")
+    else:
+        parts.append(f"{1e6 / stage.stiffness:.3g} um/N")
+    frequency = math.sqrt(stage.stiffness / stage.mass) / (2.0 * math.pi)
+    parts.append(f"natural frequency {frequency:.4g} Hz")
+    parts.append(f"lag {1e3 * stage.damping / stage.stiffness:.3g} ms")
+    return parts
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}{'' if number == 1 else 's'}"

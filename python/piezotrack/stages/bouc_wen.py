@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .base import Stage, StageState, mechanical_ratios, stage
+from .base import Stage, mechanical_ratios, stage
+from .motion import StageState
 
 if TYPE_CHECKING:
     from .base import Ratio

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .base import ForceState, Stage, stage
+from .base import Stage, stage
+from .motion import ForceState
 
 __all__ = ["BoucWenOscillator"]
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .base import Stage, StageState, stage
+from .base import Stage, stage
+from .motion import StageState
 
 __all__ = ["DuhemStage", "DuhemState"]
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .base import ForceState, Stage, mechanical_ratios, stage
+from .base import Stage, mechanical_ratios, stage
+from .motion import ForceState
 
 if TYPE_CHECKING:
     from .base import Ratio

@@ -19,7 +19,7 @@ from ..references.reference import Reference, SampledReference
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .base import Stage, StageState
+    from .motion import StageState
 
     Array = NDArray[np.float64]
 
@@ -97,7 +97,8 @@ class Inverse:
     True
     """
 
-    stage: Stage
+    # A stage of any model: the stages make inverses, and are not known here.
+    stage: Any
     offset: float = 0.0
     delay: float = 0.0
     playback: Playback = "table"
@@ -126,7 +127,10 @@ class Inverse:
 
     def _inverse(self, dt: float) -> _core.Inverse:
         initial = None if self.initial is None else self.stage._checked(self.initial)._named
-        return self.stage._core.inverse(dt, offset=self.offset, delay=self.delay, initial=initial)
+        core: _core.Inverse = self.stage._core.inverse(
+            dt, offset=self.offset, delay=self.delay, initial=initial
+        )
+        return core
 
     def voltage(
         self,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .base import Response, Stage, StageState, stage
+from .base import Stage, stage
+from .motion import Response, StageState
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -9,11 +9,9 @@ import numpy as np
 from ..identification.experiments.sensor_noise import Noise, identify_noise
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from .apparatus import Apparatus
 
-__all__ = ["at_rest", "draw", "observe"]
+__all__ = ["at_rest", "observe"]
 
 RATE, SECONDS = 5000.0, 10.0
 
@@ -26,8 +24,3 @@ def at_rest(apparatus: Apparatus) -> Noise:
 def observe(noise: Noise) -> dict[str, float]:
     """Compute the published quantities, SI."""
     return {"rest.rms": noise.rms, "rest.step": noise.resolution}
-
-
-def draw(noise: Noise) -> Figure:
-    """Draw record and spectrum."""
-    return noise.plot()

@@ -9,11 +9,9 @@ import numpy as np
 from ..identification.experiments.step_response import StepResult, identify_step
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from .apparatus import Apparatus
 
-__all__ = ["draw", "observe", "step_test"]
+__all__ = ["observe", "step_test"]
 
 RATE, VOLTS = 5000.0, 75.0
 # Long enough for the ringing to decay, and not longer because of creep.
@@ -39,8 +37,3 @@ def observe(step: StepResult) -> dict[str, float]:
         "step.frequency": read.frequency,
         "step.zeta": step.damping_ratio,
     }
-
-
-def draw(step: StepResult) -> Figure:
-    """Draw step and spectrum."""
-    return step.plot()

@@ -13,12 +13,10 @@ from ..stages.dahl import DahlStage
 from .procedure import FITTED_SECONDS, SEARCH_BOX
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ..identification.fitted.identification import Identification
     from .apparatus import Apparatus
 
-__all__ = ["draw", "observe", "record", "search", "thinned"]
+__all__ = ["observe", "record", "search", "thinned"]
 
 RATE, SECONDS, FREQUENCY, VOLTS = 5000.0, 12.0, 0.25, 75.0
 
@@ -66,13 +64,3 @@ def observe(fit: Identification) -> dict[str, float]:
         "table_1.stiffness": fit.model.stiffness,
         "table_1.piezo": fit.model.piezo_coefficient,
     }
-
-
-def draw(fit: Identification) -> Figure:
-    """Draw the convergence of the swarm."""
-    from .._support.plot_style import panels, whole
-    from ..identification.views.plot import plot_convergence
-
-    figure = panels(None, (11.0, 4.2))
-    plot_convergence(fit, figure.add_subplot())
-    return whole(figure)

@@ -11,12 +11,10 @@ from .fig_06_identification import thinned
 from .procedure import FITTED_SECONDS
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ..data.dataset import Dataset
     from ..identification.fitted.identification import Identification
 
-__all__ = ["draw", "judge", "largest", "observe"]
+__all__ = ["judge", "largest", "observe"]
 
 
 def judge(log: Dataset, fit: Identification, seed: int, *, every: int = 10) -> Comparison:
@@ -49,11 +47,6 @@ def observe(judged: Comparison) -> dict[str, float]:
     """Compute the published quantities, SI, and the same of the other model."""
     found = largest(judged)
     return {"models.dahl": found["dahl"], "models.bouc-wen": found["bouc-wen"]}
-
-
-def draw(judged: Comparison) -> Figure:
-    """Draw the loop and the errors."""
-    return judged.plot()
 
 
 def published_bouc_wen(log: Dataset) -> float:

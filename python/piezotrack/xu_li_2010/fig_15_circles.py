@@ -11,14 +11,12 @@ from .fig_12_14_tracking import PID
 from .table_2 import Table2, run_table_2
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ..control.loop.tracking import Tracking
     from ..stages.inverse import Inverse
     from ..stages.xy import XYStage
     from .apparatus import Apparatus
 
-__all__ = ["circles", "draw", "observe"]
+__all__ = ["circles", "observe"]
 
 
 def circles(
@@ -60,8 +58,3 @@ def _largest(axis: Tracking, settled: float, lag: float, true: bool) -> float:
     seen = np.interp(axis.t + lag, axis.fine_t, axis.fine_displacement)
     part = (axis.t >= settled) & (axis.t + lag <= axis.t[-1])
     return float(np.abs(axis.desired - seen)[part].max())
-
-
-def draw(table: Table2) -> Figure:
-    """Draw circles, errors and the table as bars."""
-    return table.plot()

@@ -24,7 +24,6 @@ from .section import Section
 if TYPE_CHECKING:
     import os
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -102,27 +101,6 @@ class Drives:
             ),
             rows=tuple(rows),
         )
-
-    def plot(self) -> Figure:
-        """Draw the drives over the reference and, less the line, over time."""
-        from .._support.plot_style import MEASURED, MODELS, legend_inside, panels, whole
-
-        figure = panels(None, (11.0, 4.6))
-        left, right = figure.subplots(1, 2)
-        # Two periods of 1 Hz.
-        part = self.t < self.t[0] + 2.0
-        t, um = self.t[part], 1e6 * (self.desired - self.desired.mean())[part]
-        left.plot(um, (self.measured - self.line)[part], **MEASURED)
-        right.plot(t, (self.measured - self.line)[part], **MEASURED)
-        for (name, voltage), line in zip(self.computed.items(), MODELS, strict=False):
-            added = (voltage - self.line)[part]
-            left.plot(um, added, linewidth=1.1, label=name, **line)
-            right.plot(t, added, linewidth=1.1, label=name, **line)
-        left.set(xlabel="reference [um]", ylabel="drive - straight line [V]")
-        right.set(xlabel="time [s]", ylabel="drive - straight line [V]")
-        right.margins(x=0.0)
-        legend_inside(right, ncols=2)
-        return whole(figure)
 
 
 def drives(folder: str | os.PathLike[str]) -> Drives:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from .. import _core
 from .._support.progress_bar import ProgressBar
+from .._support.result import Result
 from .._support.two_threads import one_by_one, two_threads
 from ..errors import ParameterError
 from .apparatus import Apparatus, calibration_file
@@ -21,21 +22,23 @@ from .run import Experiments, run_experiments
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from .section import Section
 
-__all__ = ["Reproduction", "reproduce"]
+__all__ = ["REPORT", "Reproduction", "reproduce"]
 
 SEEDS = 20
 # The calibration uses seeds below this, and no report does.
 FIRST_SEED = 1000
 FORMAT, SCHEMA_VERSION = "piezotrack-reproduction", 1
+# Files of the report.
+REPORT = ("report.html", "report.pdf", "report.json")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Reproduction:
+class Reproduction(Result):
     """Published and obtained numbers and figures of the paper; see `reproduce`.
 
     Attributes
@@ -53,6 +56,12 @@ class Reproduction:
     drives : Drives or None
         Drives of a measured log, if one was given.
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "xu_li_2010.views.report_text:summary_text",
+        "plot": "xu_li_2010.views.figures:plot_reproduction",
+        "report": "xu_li_2010.views.report_files:save_report",
+    }
 
     experiments: Experiments
     values: tuple[dict[str, float], ...]
@@ -93,18 +102,6 @@ class Reproduction:
         if key not in self.true_values[0]:
             return None
         return float(np.median([one[key] for one in self.true_values]))
-
-    def summary(self) -> str:
-        """Table of published and obtained numbers, and the conclusions.
-
-        Returns
-        -------
-        str
-            Several lines.
-        """
-        from .report_text import summary_text
-
-        return summary_text(self)
 
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.
@@ -162,9 +159,8 @@ class Reproduction:
         DataError
             The folder cannot be made or written to.
         """
-        from .report_files import save_report
-
-        return save_report(self, folder)
+        written: list[Path] = self.view("report")(self, folder)
+        return written
 
 
 def reproduce(

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
+from .._support.result import Result
 from ..control.loop.contouring import Contour, contour
 from ..references.paths import circle
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike
 
     from ..control.controller.controller import Controller
@@ -59,7 +59,7 @@ PUBLISHED = tuple(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Table2:
+class Table2(Result):
     """The nine circles, run.
 
     Attributes
@@ -68,47 +68,17 @@ class Table2:
         In the order of the table: by radius, then by frequency.
     """
 
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "xu_li_2010.views.report_text:table_2_text",
+        "plot": "xu_li_2010.views.table_2_plot:plot_table_2",
+    }
+
     runs: tuple[Contour, ...]
 
     @property
     def cases(self) -> list[tuple[Published, Contour]]:
         """Published values and run of each circle."""
         return list(zip(PUBLISHED, self.runs, strict=False))
-
-    def __str__(self) -> str:
-        lines = [
-            "contour error in um, published / obtained; max is peak to peak",
-            "radius um  frequency Hz          max               mean                SD"
-            "             max / SD",
-        ]
-        for case, run in self.cases:
-            found = run.metrics
-            pairs = (
-                (case.peak_to_peak, found.peak_to_peak),
-                (case.mean, found.mean_error),
-                (case.sd, found.sd_error),
-            )
-            cells = "  ".join(f"{1e6 * one:>7.3f} /{1e6 * other:>7.3f}" for one, other in pairs)
-            ratio = f"{case.ratio:>6.1f} /{found.peak_to_peak / found.sd_error:>5.1f}"
-            lines.append(f"{1e6 * case.radius:>9g}  {case.frequency:>12g}  {cells}  {ratio}")
-        return "\n".join(lines)
-
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Plot the circles at 0.1 Hz as in Fig. 15, their errors, and the table as bars.
-
-        Parameters
-        ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-        """
-        from .table_2_plot import plot_table_2
-
-        return plot_table_2(self, fig)
 
 
 def run_table_2(

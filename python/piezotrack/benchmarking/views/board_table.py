@@ -6,8 +6,10 @@ import math
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
+from ..._support.table import Column, Table
+
 if TYPE_CHECKING:
-    from ..board import Benchmark, BenchmarkResult
+    from ..board import Benchmark, BenchmarkResult, PartScore
 
 __all__ = ["board_markdown", "board_text"]
 
@@ -18,7 +20,6 @@ whatever else it did. inverse: its drive for the measured displacement of a part
 the recorded drive, rms in per cent of the drive's range."""
 # Of a line in a terminal.
 WIDTH = 100
-HEADS = ("K", "s", "um", "inverse")
 
 
 def board_text(board: Benchmark) -> str:
@@ -37,26 +38,13 @@ def board_text(board: Benchmark) -> str:
     lines: list[str] = []
     for name in board.records:
         rows = board.of(name)
-        heads, cells = _heads(rows), [_cells(row) for row in rows]
-        width = max(len(_title(row)) for row in rows)
-        wide = [
-            max(len(head), *(len(cell[i]) for cell in cells if cell)) if any(cells) else len(head)
-            for i, head in enumerate(heads)
-        ]
-        lines += [_about(rows), f"  {'model':<{width}}{_line(heads, wide)}"]
-        for row, cell in zip(rows, cells, strict=True):
-            if cell:
-                lines.append(f"  {_title(row):<{width}}{_line(cell, wide)}")
+        lines += [_about(rows), *_table(rows).lines()]
         for row in rows:
             if row.error:
                 said = f"no fit: {_title(row)}: {row.error}"
                 lines += wrap(said, WIDTH, initial_indent="  ", subsequent_indent="    ")
         lines.append("")
     return "\n".join([*lines, NOTES])
-
-
-def _line(cells: list[str], wide: list[int]) -> str:
-    return "".join(f"  {cell:>{width}}" for cell, width in zip(cells, wide, strict=True))
 
 
 def board_markdown(board: Benchmark) -> str:
@@ -75,17 +63,10 @@ def board_markdown(board: Benchmark) -> str:
     lines: list[str] = []
     for name in board.records:
         rows = board.of(name)
-        heads = ["model", *_heads(rows)]
-        lines += [f"**{_about(rows)}**", "", _row(heads), _row(["---"] * len(heads))]
-        lines += [_row([_title(row), *_cells(row)]) for row in rows if row.parts]
+        lines += [f"**{_about(rows)}**", "", _table(rows).markdown()]
         failed = [f"No fit: {_title(row)}: {row.error}." for row in rows if not row.parts]
         lines += ["", *failed, *([""] if failed else [])]
     return "\n".join([*lines, NOTES])
-
-
-def _row(cells: list[str]) -> str:
-    plain = (cell.replace("|", "\\|").replace("\n", " ") for cell in cells)
-    return f"| {' | '.join(plain)} |"
 
 
 def _about(rows: list[BenchmarkResult]) -> str:
@@ -94,21 +75,29 @@ def _about(rows: list[BenchmarkResult]) -> str:
     return f"{first.record_title} (stroke {1e6 * first.stroke:.4g} um{noise})"
 
 
-def _heads(rows: list[BenchmarkResult]) -> list[str]:
+def _table(rows: list[BenchmarkResult]) -> Table:
+    """Make the table of the models that have a fit."""
     parts = next((row.parts for row in rows if row.parts), ())
-    return [*(part.part for part in parts), *HEADS]
+    columns = [
+        Column("model", width=max(len(_title(row)) for row in rows), left=True),
+        *(Column(part.part, format=".3g") for part in parts),
+        Column("K"),
+        Column("s"),
+        Column("um", format=".3g"),
+        Column("inverse"),
+    ]
+    return Table(columns, [_cells(row, row.judged) for row in rows if row.judged is not None])
 
 
-def _cells(row: BenchmarkResult) -> list[str]:
-    if not row.parts or row.judged is None:
-        return []
+def _cells(row: BenchmarkResult, judged: PartScore) -> list[object]:
     inverse = row.inverse
     return [
-        *(f"{part.rms_percent:.3g}" for part in row.parts),
-        "-" if row.values is None else str(row.values),
+        _title(row),
+        *(part.rms_percent for part in row.parts),
+        row.values,
         f"{row.seconds:.2g}" if row.seconds < 10.0 else f"{row.seconds:.0f}",
-        f"{1e6 * row.judged.max_error:.3g}",
-        "-" if inverse is None or inverse.error else f"{inverse.drive_percent:.3g}",
+        1e6 * judged.max_error,
+        None if inverse is None or inverse.error else f"{inverse.drive_percent:.3g}",
     ]
 
 

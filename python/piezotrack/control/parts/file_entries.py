@@ -11,7 +11,7 @@ from ..._support.arguments import as_numbers
 from ..._support.json_text import object_of
 from ..._support.messages import quoted
 from ...errors import ParameterError
-from ...identification.fitted.model_file import parameter_entries
+from ...identification.fitted.model_entries import parameter_entries
 from ...identification.fitted.model_file import stage_of as stage_of_parameters
 from ...stages.registry import model_named
 from .part import Part, part_class

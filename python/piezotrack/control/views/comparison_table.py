@@ -7,7 +7,7 @@ import re
 from textwrap import wrap
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..._support.html_table import html_table
+from ..._support.table import words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -176,6 +176,6 @@ def _line(name: str, cells: Sequence[str], first: int, widths: Sequence[int]) ->
 def comparison_html(comparison: ControllerComparison) -> str:
     """Write the tables for a notebook."""
     return "".join(
-        html_table(one.title, [(name, *cells) for name, cells in one.rows], ["", *one.heads])
+        words(one.title, [(name, *cells) for name, cells in one.rows], ["", *one.heads]).html()
         for one in grids(comparison)
     )

@@ -11,7 +11,7 @@ from ..._support.files import json_ready, make_folder, write_document
 from ..._support.json_text import parse_json
 from ..._support.messages import listed, quoted
 from ...errors import DataError, ParameterError
-from ..fitted.model_file import FORMAT as MODEL
+from ..fitted.model_entries import FORMAT as MODEL
 from .task import FAILURE
 
 if TYPE_CHECKING:

@@ -6,20 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, ClassVar, overload
 
 from ..._support.files import replacing
 from ..._support.frames import frame_of
+from ..._support.result import Result
 from ...errors import DataError, ParameterError
-from ..fitted.identified_model import IdentifiedModel, load
+from ..fitted.model_file import load
 from .task import FAILURE
 
 if TYPE_CHECKING:
     import os
 
-    from matplotlib.figure import Figure, SubFigure
+    from ..fitted.identified_model import IdentifiedModel
 
-__all__ = ["Campaign", "TaskResult"]
+__all__ = ["Campaign", "TaskResult", "check_parquet", "size_of"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -126,7 +127,7 @@ class TaskResult:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Campaign(Sequence[TaskResult]):
+class Campaign(Result, Sequence[TaskResult]):
     """Models of many records; see `campaign`.
 
     A sequence of `TaskResult`: ``found[0]``, ``len(found)``, ``for one in found``.
@@ -138,6 +139,12 @@ class Campaign(Sequence[TaskResult]):
     folder : pathlib.Path
         Where the files are.
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "identification.views.campaign_report:campaign_text",
+        "plot": "identification.views.campaign_plot:plot_campaign",
+        "html": "identification.views.campaign_report:campaign_html",
+    }
 
     results: tuple[TaskResult, ...]
     folder: Path
@@ -153,14 +160,7 @@ class Campaign(Sequence[TaskResult]):
         return len(self.results)
 
     def __repr__(self) -> str:
-        from ..views.campaign_report import size_of
-
         return f"<Campaign, {size_of(self)}; see summary()>"
-
-    def _repr_html_(self) -> str:
-        from ..views.campaign_report import campaign_html
-
-        return campaign_html(self)
 
     @classmethod
     def load(cls, folder: str | os.PathLike[str]) -> Campaign:
@@ -238,18 +238,6 @@ class Campaign(Sequence[TaskResult]):
             groups.setdefault((one.record, one.model), []).append(one)
         return groups
 
-    def summary(self) -> str:
-        """Table of the campaign.
-
-        Returns
-        -------
-        str
-            One line for each record and model, and one for each task without a model.
-        """
-        from ..views.campaign_report import campaign_text
-
-        return campaign_text(self)
-
     def document(self) -> dict[str, Any]:
         """Return the figures of all tasks, as `to_frame` has them, with the notes in words.
 
@@ -259,23 +247,6 @@ class Campaign(Sequence[TaskResult]):
             Of numbers, texts, lists and dicts only.
         """
         return {"results": [{**one.row, "notes": one.notes} for one in self]}
-
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Cost of every task by record; with several seeds, how far each is above the lowest.
-
-        Parameters
-        ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-        """
-        from ..views.campaign_plot import plot_campaign
-
-        return plot_campaign(self, fig)
 
     def to_frame(self) -> Any:
         """Return the figures and the parameters as a data frame of pandas.
@@ -322,6 +293,14 @@ class Campaign(Sequence[TaskResult]):
         with replacing(path) as temporary:
             self.to_frame().to_parquet(temporary, engine="pyarrow", index=False)
         return Path(path)
+
+
+def size_of(campaign: Campaign) -> str:
+    """Count records, models and tasks in words."""
+    counts = {"record": len(campaign.records), "model": len(campaign.models), "task": len(campaign)}
+    words = [f"{n} {word}" if n == 1 else f"{n} {word}s" for word, n in counts.items()]
+    failed = [f"{len(campaign.failed)} without a model"] if campaign.failed else []
+    return ", ".join([*words, *failed])
 
 
 def check_parquet() -> None:

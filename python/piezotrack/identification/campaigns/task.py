@@ -17,12 +17,12 @@ from ...stages.registry import model_named
 from ..fit import identify
 from ..fitted.drift import drift_of_asked
 from ..methods.descents import Descents
+from ..methods.least_squares import LeastSquares
 from ..methods.particle_swarm import ParticleSwarm
 from ..problem.fingerprint import exact, key_of, plain, record_key
 from ..problem.problem import delay_bounds
 from ..solve.one_model import refuse_given
 from ..solve.selection import AUTO
-from ..solve.weights import LeastSquares
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,22 +6,29 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ... import _core
 from ..._support.arguments import expect, has_entries, one_of
-from ..._support.files import picture_files, write_document
+from ..._support.files import (
+    make_folder,
+    picture_files,
+    save_figures,
+    together,
+    write_document,
+)
+from ..._support.result import Result
 from ...data.dataset import Dataset
 from ...errors import ParameterError
 from ...stages.registry import MODELS, ModelInfo, model_named
 from ..fit import identify
-from ..fitted.identified_model import IdentifiedModel, load
-from ..fitted.model_file import provenance
+from ..fitted.identified_model import IdentifiedModel
+from ..fitted.model_entries import provenance
+from ..fitted.model_file import load
 from .parts import parts_of
 
 if TYPE_CHECKING:
     import numpy as np
-    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ..fitted.score import Score
@@ -73,7 +80,7 @@ class ModelScore:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Comparison:
+class Comparison(Result):
     """Comparison of models; see `compare`.
 
     Attributes
@@ -87,6 +94,12 @@ class Comparison:
         otherwise it is another record, with an offset of its own.
     """
 
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "identification.views.comparison_report:comparison_text",
+        "plot": "identification.views.comparison_plot:plot_comparison",
+        "html": "identification.views.comparison_report:comparison_html",
+    }
+
     rows: tuple[ModelScore, ...]
     train: Dataset
     test: Dataset
@@ -95,11 +108,6 @@ class Comparison:
     def __repr__(self) -> str:
         scores = "; ".join(f"{row.title} {row.test.rms_percent:.3g} %" for row in self.rows)
         return f"<Comparison, rms on what was not fitted: {scores}; see summary()>"
-
-    def _repr_html_(self) -> str:
-        from ..views.html import comparison_html
-
-        return comparison_html(self)
 
     @property
     def best(self) -> ModelScore:
@@ -144,35 +152,6 @@ class Comparison:
         x: Array = row.fit.simulate(data, offset="own" if own else score.offset).x
         return x
 
-    def summary(self) -> str:
-        """Table of the comparison, with the best model marked.
-
-        Returns
-        -------
-        str
-            Several lines.
-        """
-        from ..views.comparison_report import comparison_text
-
-        return comparison_text(self)
-
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Loops in one panel, errors over time with the split marked, and the RMS as bars.
-
-        Parameters
-        ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-        """
-        from ..views.comparison_plot import plot_comparison
-
-        return plot_comparison(self, fig)
-
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.
 
@@ -212,8 +191,6 @@ class Comparison:
         DataError
             The folder cannot be made or written to.
         """
-        from ..._support.files import make_folder, save_figures, together
-
         with together(make_folder(folder)) as path:
             return [
                 write_document(path / "comparison.json", self.document()),

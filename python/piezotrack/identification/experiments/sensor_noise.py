@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ... import _core
 from ..._support.arguments import expect
 from ..._support.arrays import real_array
+from ..._support.files import make_folder, save_figures, together, write_document
+from ..._support.result import Result
 from ..._support.statistics import ErrorStatistics
 from ...data.dataset import Dataset
 from ...errors import DataError, ParameterError
 from ...stages.virtual import VirtualStage
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure, SubFigure
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -31,7 +36,7 @@ SLOWEST = 10.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Noise:
+class Noise(Result):
     r"""Noise of a sensor at rest, and a model of it.
 
     The model is white noise through a first-order low-pass, quantised: the one-sided spectral
@@ -58,6 +63,11 @@ class Noise:
     bandwidth_sd : float or None
         Standard deviation of the bandwidth [Hz]; None for white noise.
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "identification.views.sensor_noise_report:noise_text",
+        "plot": "identification.views.sensor_noise_plot:plot_noise",
+    }
 
     data: Dataset
     spread: ErrorStatistics
@@ -145,48 +155,53 @@ class Noise:
             f"of {self.data.duration:.4g} s: was the stage at rest?"
         ]
 
-    def summary(self) -> str:
-        """Table of the figures.
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
 
         Returns
         -------
-        str
-            Several lines.
+        dict
+            Of numbers, texts, lists and dicts only.
         """
-        data = self.data
-        steps = f"{1e6 * self.resolution:.5g} um, {self.levels} levels seen"
-        colour = "white, as far as this sampling rate shows"
-        if self.bandwidth_sd is not None:
-            colour = f"low-pass of {self.bandwidth:.4g} +- {self.bandwidth_sd:.2g} Hz"
-        return "\n".join(
-            [
-                f"at rest: {data.source or 'a record'}, {len(data)} samples, "
-                f"{data.duration:.4g} s at {1.0 / data.dt:.6g} Hz",
-                *(f"note  {note}" for note in self.notes),
-                f"rms           {1e6 * self.rms:.5g} um about the drift",
-                f"peak to peak  {1e6 * self.spread.peak_to_peak:.5g} um",
-                f"drift         {1e6 * self.drift:.4g} um over the record",
-                f"steps         {steps if self.resolution else 'none found'}",
-                f"noise model   {1e6 * self.noise:.5g} um rms before the steps, {colour}",
-            ]
-        )
+        return {
+            "format": "piezotrack-noise",
+            "schema_version": 1,
+            "unit": "m, Hz",
+            "spread": asdict(self.spread),
+            "drift": self.drift,
+            "resolution": self.resolution,
+            "levels": self.levels,
+            "noise": self.noise,
+            # JSON has no infinity.
+            "bandwidth": None if self.bandwidth_sd is None else self.bandwidth,
+            "bandwidth_sd": self.bandwidth_sd,
+            "data": {"source": self.data.source, "sha256": self.data.sha256},
+            "provenance": {"package": "piezotrack", "version": _core.__version__},
+        }
 
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Record in time, and its spectrum with that of the model.
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write the figures as JSON, and the picture.
 
         Parameters
         ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
+        folder : path-like
+            Where to; made where it is missing.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-        """
-        from ..views.sensor_noise_plot import plot_noise
+        list of pathlib.Path
+            ``noise.json``, ``noise.png`` and ``noise.svg``.
 
-        return plot_noise(self, fig)
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
+        """
+        with together(make_folder(folder)) as path:
+            return [
+                write_document(path / "noise.json", self.document()),
+                *save_figures({"noise": self.plot()}, path),
+            ]
 
 
 def identify_noise(log: Dataset) -> Noise:

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ... import _core
+from ..._support.files import make_folder, save_figures, together, write_document
 from ..._support.messages import quoted
+from ..._support.result import Result
 from ...data.dataset import Dataset
 from ...errors import ParameterError
 from ...stages.dahl import DahlStage
 from .step_readings import StepReadings
 
 if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
     import numpy as np
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -75,7 +81,7 @@ class StepTrace:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class StepResult:
+class StepResult(Result):
     r"""Result of a step response.
 
     .. math::
@@ -111,6 +117,13 @@ class StepResult:
     The paper reads a1 and a2 off in time, 1/s and 1/s^2, and uses the same numbers along the
     displacement, 1/m and 1/m^2; b1 takes the gain in um/V. That is a convention, not physics.
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "identification.views.step_report:step_text",
+        "plot": "identification.views.step_plot:plot_step_result",
+        "step": "identification.views.step_plot:plot_step",
+        "spectrum": "identification.views.step_plot:plot_spectrum",
+    }
 
     readings: StepReadings
     trace: StepTrace | None
@@ -247,41 +260,114 @@ class StepResult:
             )
         return notes
 
-    def summary(self) -> str:
-        """Table of the result.
-
-        Returns
-        -------
-        str
-            Several lines: the readings, the parameters, and what remains undetermined.
-        """
-        from ..views.step_report import step_text
-
-        return step_text(self)
-
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Draw the step with its peaks marked, and the spectrum with its resonance.
-
-        One panel alone, in axes of your own: `plot_step`, `plot_spectrum`.
+    def plot_step(self, *, ax: Axes | None = None) -> Axes:
+        """Draw the displacement after the step, with the peaks and the level it ends at.
 
         Parameters
         ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure where not given.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+        matplotlib.axes.Axes
+            The axes drawn on.
 
         Raises
         ------
         ParameterError
             The readings were entered by hand: there is no record to draw.
-        """
-        from ..views.step_plot import plot_step_result
 
-        return plot_step_result(self, fig)
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> u = np.where(np.arange(1600) < 100, 0.0, 75.0)
+        >>> step = pt.identify_step(pt.VirtualStage.xu_li_2010(seed=1).record(u, 2e-4, hold="zoh"))
+        >>> step.plot_step(ax=Figure().subplots()).get_xlabel()
+        'time after the step [ms]'
+        """
+        drawn: Axes = self.view("step")(self, ax)
+        return drawn
+
+    def plot_spectrum(self, *, ax: Axes | None = None) -> Axes:
+        """Draw the gain over the frequency, with the resonance and the static gain.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure where not given.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes drawn on.
+
+        Raises
+        ------
+        ParameterError
+            The readings were entered by hand: there is no record to draw.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> u = np.where(np.arange(1600) < 100, 0.0, 75.0)
+        >>> step = pt.identify_step(pt.VirtualStage.xu_li_2010(seed=1).record(u, 2e-4, hold="zoh"))
+        >>> step.plot_spectrum(ax=Figure().subplots()).get_ylabel()
+        'gain [um/V]'
+        """
+        drawn: Axes = self.view("spectrum")(self, ax)
+        return drawn
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file: readings and results, SI.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return {
+            "format": "piezotrack-step",
+            "schema_version": 1,
+            "unit": "V, m, s, Hz, rad/s; a1 1/m, a2 1/m^2, b1 N/m^2, b0 N/m",
+            "readings": asdict(self.readings),
+            "natural_angular_frequency": self.natural_angular_frequency,
+            "damping_ratio": self.damping_ratio,
+            "damping_by_decrement": self.damping_by_decrement,
+            "time_constant": self.time_constant,
+            "hysteresis": self.hysteresis,
+            "ratios": self.ratios,
+            "provenance": {"package": "piezotrack", "version": _core.__version__},
+        }
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write readings and results as JSON, and the picture of a record.
+
+        Parameters
+        ----------
+        folder : path-like
+            Where to; made where it is missing.
+
+        Returns
+        -------
+        list of pathlib.Path
+            ``step.json``, ``step.png`` and ``step.svg``; of readings entered by hand the first.
+
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
+        """
+        figures = {} if self.trace is None else {"step": self.plot()}
+        with together(make_folder(folder)) as path:
+            return [
+                write_document(path / "step.json", self.document()),
+                *save_figures(figures, path),
+            ]
 
 
 def identify_step(

@@ -13,15 +13,15 @@ from ...errors import NumericalError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...stages.base import Response
     from ...stages.model_info import ModelInfo
+    from ...stages.motion import Response
 
     Array = NDArray[np.float64]
 
-__all__ = ["late_reading"]
+__all__ = ["delayed_reading"]
 
 
-def late_reading(info: ModelInfo, run: Response, delay: float) -> Array:
+def delayed_reading(info: ModelInfo, run: Response, delay: float) -> Array:
     """Displacement of a stage as it is read a delay later.
 
     Parameters

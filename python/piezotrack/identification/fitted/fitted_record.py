@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from ...data.dataset import Dataset
-    from ...stages.base import StageState
+    from ...stages.motion import StageState
     from .estimates import Estimate
 
 __all__ = ["FittedRecord", "record_entries", "record_of", "records_of_file"]

@@ -5,30 +5,30 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from ..._support.statistics import sample_noise
 from ...data import diagnostics
-from . import notes as remarks
 from .fitted_record import FittedRecord
 from .identified_model import IdentifiedModel
+from .notes import above_noise, deviation_of, drift_notes, first_samples, fit_percent, lag_notes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
-    from ...stages.base import Response
+    from ...stages.motion import Response
     from ..methods.descents import Descents
+    from ..methods.least_squares import LeastSquares
     from ..methods.particle_swarm import ParticleSwarm
-    from ..solve.selection import Trial
-    from ..solve.weights import LeastSquares
     from .estimates import Constraint, Estimate, LagRange, StopReason, SwarmRun
     from .score import Score
+    from .trial import Trial
 
     Array = NDArray[np.float64]
 
@@ -104,6 +104,13 @@ class Identification(IdentifiedModel):
         Whether a time constant or a frequency lies on a bound of its range.
     """
 
+    views: ClassVar[Mapping[str, str]] = {
+        **IdentifiedModel.views,
+        "summary": "identification.views.report:summary_text",
+        "html": "identification.views.html:identification_html",
+        "convergence": "identification.views.plot:plot_convergence",
+    }
+
     data: Dataset
     cost: float
     nfev: int
@@ -151,11 +158,6 @@ class Identification(IdentifiedModel):
             f"{self.cost_percent:.3g} % of stroke; see summary()>"
         )
 
-    def _repr_html_(self) -> str:
-        from ..views.html import identification_html
-
-        return identification_html(self)
-
     @property
     def fun(self) -> float:
         """The cost [m], under SciPy's name."""
@@ -174,8 +176,8 @@ class Identification(IdentifiedModel):
     @property
     def fit_percent(self) -> float:
         """Share of the motion that the model explains, as `Score.fit_percent`."""
-        spread = remarks.spread_of([(data, one.weight) for data, one in self._fitted])
-        return remarks.fit_percent(self.cost, spread)
+        spread = deviation_of([(data, one.weight) for data, one in self._fitted])
+        return fit_percent(self.cost, spread)
 
     @property
     def fitted(self) -> Score:
@@ -211,7 +213,7 @@ class Identification(IdentifiedModel):
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
         rates = [_frequency(data) for data, _ in self._fitted]
         if self.lags is not None and (self.lags.from_zero or max(rates) < OTHER * min(rates)):
-            notes += remarks.of_lags(self.lags, 2.0 * math.pi * rates[0])
+            notes += lag_notes(self.lags, 2.0 * math.pi * rates[0])
         if self.at_bound:
             notes.append(
                 "the record does not determine the dynamics: time constant or mode lies on a bound"
@@ -234,12 +236,12 @@ class Identification(IdentifiedModel):
             notes += diagnostics.fit_warnings(
                 data, run.x, one.cost_percent, self.model.info.hysteresis, held
             )
-        notes += remarks.of_drift(one.drift, one.stroke)
+        notes += drift_notes(one.drift, one.stroke)
         notes += self.model._notes(lambda: run)
         if self.trials:
             # A mode moves from sample to sample as noise does; what is left of it hardly does.
-            notes += remarks.above_noise(one.cost, min(sample_noise(data.y), sample_noise(rest)))
-        return notes + remarks.first_samples(rest, data)
+            notes += above_noise(one.cost, min(sample_noise(data.y), sample_noise(rest)))
+        return notes + first_samples(rest, data)
 
     @property
     def success(self) -> bool:
@@ -262,40 +264,35 @@ class Identification(IdentifiedModel):
             return f"all {self.descents.rounds} rounds were done"
         return self.stop_reason
 
-    def summary(self) -> str:
-        """Table of the result.
-
-        Returns
-        -------
-        str
-            Several lines: the cost, the ratios that the data determine, the parameters.
-        """
-        from ..views.report import summary_text
-
-        return summary_text(self)
-
-    def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Loop, displacement with its error over time, and convergence of the search.
-
-        Of several records loop and displacement of each, one below the other.
-
-        One panel alone, in axes of your own: `plot_loop`, `plot_time`, `plot_convergence`.
+    def plot_convergence(self, *, ax: Axes | None = None) -> Axes:
+        """Draw the best cost after each iteration, and where the other restarts ended.
 
         Parameters
         ----------
-        data : Dataset, optional
-            Another record, on which the model is shown; or one of several that were identified.
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure where not given.
 
         Returns
         -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-        """
-        from ..views.plot import plot_identification
+        matplotlib.axes.Axes
+            The axes drawn on.
 
-        return plot_identification(self, data, fig)
+        Raises
+        ------
+        ParameterError
+            The model was not searched.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> log, few = pt.datasets.dbo_training()[3.0:5.0], pt.ParticleSwarm(iterations=3)
+        >>> fit = pt.identify(log, "dahl", swarm=few, runs=1, seed=1, progress=False)
+        >>> fit.plot_convergence(ax=Figure().subplots()).get_ylabel()
+        'best cost, rms [um]'
+        """
+        drawn: Axes = self.view("convergence")(self, ax)
+        return drawn
 
 
 def _frequency(data: Dataset) -> float:

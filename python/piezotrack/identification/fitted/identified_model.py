@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -11,36 +11,46 @@ from ... import _core
 from ..._support.arguments import expect
 from ..._support.arrays import LARGEST, check_dt, signal_of
 from ..._support.files import write_document
+from ..._support.result import Result
 from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
-from .delayed_reading import late_reading
-from .fitted_record import record_of
-from .model_file import document_of, drive_unit_of, read_model, sensor_number
-from .notes import beyond_fit
+from .delayed_reading import delayed_reading
+from .drift import drift_entry
+from .fitted_record import record_entries, record_of
+from .model_entries import (
+    FORMAT,
+    SCHEMA_VERSION,
+    drive_unit_of,
+    parameter_entries,
+    sensor_number,
+)
+from .notes import extrapolation_notes
 from .score import Score
-from .start import begin, checked_history, same_beginning
+from .start import begin, checked_history, same_beginning, start_entry
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
 
     from ...data.dataset import Hold
-    from ...stages.base import Response, StageState
     from ...stages.inverse import Inverse
+    from ...stages.motion import Response, StageState
     from .drift import Drift
     from .fitted_record import FittedRecord
     from .start import History, Start
 
     Array = NDArray[np.float64]
 
-__all__ = ["IdentifiedModel", "load"]
+__all__ = ["IdentifiedModel"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class IdentifiedModel:
+class IdentifiedModel(Result):
     """An identified stage, with the offset and delay of its sensor.
 
     Attributes
@@ -71,6 +81,13 @@ class IdentifiedModel:
     details : mapping
         Other entries of the model file: fit, provenance.
     """
+
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "identification.views.report:model_text",
+        "plot": "identification.views.plot:plot_model",
+        "loop": "identification.views.plot:plot_model_loop",
+        "time": "identification.views.plot:plot_model_time",
+    }
 
     # A stage of any model: each has its own parameters.
     model: Any
@@ -140,7 +157,7 @@ class IdentifiedModel:
         own = delay + offsets + sum(1 + one.time_fitted for one in drifts)
         return sum(_count(getattr(self.model, name)) for name in free) + own
 
-    def beyond_fit(self, u: ArrayLike, dt: float | None = None) -> list[str]:
+    def extrapolation_notes(self, u: ArrayLike, dt: float | None = None) -> list[str]:
         """Remarks on a drive that goes beyond the range or the rate of the record identified.
 
         Parameters
@@ -166,7 +183,7 @@ class IdentifiedModel:
         if not drive.size:
             raise ShapeError("u has no samples: expected at least one")
         most = float(max(rates)) if rates else None
-        return beyond_fit(drive, interval, self.drive_range, most, self.drive_unit)
+        return extrapolation_notes(drive, interval, self.drive_range, most, self.drive_unit)
 
     def fitted_on(self, data: Dataset) -> bool:
         """Return whether a record is the one identified, sample by sample.
@@ -253,7 +270,7 @@ class IdentifiedModel:
             Displacement with offset and delay [m].
         """
         run = self.model.simulate(u, dt, hold=hold, initial=initial)
-        return late_reading(self.model.info, run, self.delay) + self.offset
+        return delayed_reading(self.model.info, run, self.delay) + self.offset
 
     def _delay_on(self, data: Dataset) -> float:
         """Delay of the sensor on a record [s]: its own where it is one of those identified."""
@@ -310,7 +327,9 @@ class IdentifiedModel:
         state = self._begins(data, history, initial)
         start = data.warmup
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = late_reading(self.model.info, run, self._delay_on(data))[start:] + self._drift_on(data)
+        x = delayed_reading(self.model.info, run, self._delay_on(data))[start:] + self._drift_on(
+            data
+        )
         signals = {
             one.name: value[start:]
             for one in fields(run)
@@ -367,7 +386,7 @@ class IdentifiedModel:
             stroke=self.stroke if own is None else own.stroke,
             offset=shift,
             spread=float(np.std(data.y)),
-            notes=tuple(self.beyond_fit(data.u, data.dt)),
+            notes=tuple(self.extrapolation_notes(data.u, data.dt)),
         )
 
     def start_on(self, data: Dataset, *, history: History | None = None) -> Start:
@@ -396,7 +415,7 @@ class IdentifiedModel:
     def _residual(self, data: Dataset, state: StageState) -> Array:
         """Measured less simulated displacement in the window, without offset [m]."""
         run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = late_reading(self.model.info, run, self._delay_on(data))[
+        x = delayed_reading(self.model.info, run, self._delay_on(data))[
             data.warmup :
         ] + self._drift_on(data)
         rest: Array = data.y - x - self._added(data, x, "own")[0]
@@ -427,6 +446,100 @@ class IdentifiedModel:
             return shift
         return float(np.mean(data.y - x)) if self._fits_offset(data) else 0.0
 
+    def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
+        """Loop, displacement with its error over time, and convergence of a search.
+
+        Of several records loop and displacement of each, one below the other.
+
+        Parameters
+        ----------
+        data : Dataset, optional
+            Record on which the model is shown; that of the fit where not given. A model from a file
+            has none.
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
+
+        Raises
+        ------
+        ParameterError
+            There is no record.
+        """
+        figure: Figure = self.view("plot")(self, data, fig)
+        return figure
+
+    def plot_loop(self, data: Dataset | None = None, *, ax: Axes | None = None) -> Axes:
+        """Draw the hysteresis loop: displacement over drive, measured and simulated.
+
+        Parameters
+        ----------
+        data : Dataset, optional
+            As of `plot`.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure where not given.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes drawn on.
+
+        Raises
+        ------
+        ParameterError
+            There is no record.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:8.0]
+        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+        >>> ax = fit.plot_loop(ax=Figure().subplots())
+        >>> ax.get_xlabel(), ax.get_ylabel()
+        ('drive [V]', 'displacement [um]')
+        """
+        drawn: Axes = self.view("loop")(self, data, ax)
+        return drawn
+
+    def plot_time(
+        self, data: Dataset | None = None, *, axes: Sequence[Axes] | None = None
+    ) -> tuple[Axes, Axes]:
+        """Draw measured and simulated displacement over time, and the error below.
+
+        Parameters
+        ----------
+        data : Dataset, optional
+            As of `plot`.
+        axes : two matplotlib.axes.Axes, optional
+            Where to draw; a new figure where not given.
+
+        Returns
+        -------
+        tuple of two matplotlib.axes.Axes
+            Displacement, error.
+
+        Raises
+        ------
+        ParameterError
+            There is no record.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:8.0]
+        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+        >>> above, below = fit.plot_time(axes=Figure().subplots(2, 1))
+        >>> below.get_ylabel()
+        'error [nm]'
+        """
+        drawn: tuple[Axes, Axes] = self.view("time")(self, data, axes)
+        return drawn
+
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.
 
@@ -435,7 +548,27 @@ class IdentifiedModel:
         dict
             Of numbers, texts, lists and dicts only.
         """
-        return document_of(self)
+        details, info = dict(self.details), self.model.info
+        found = details.pop("parameters", {})
+        delay = dict(details.pop("delay", {}))
+        parameters = {
+            name: entry | dict(found.get(name, {}))
+            for name, entry in parameter_entries(self.model, self.drive_unit).items()
+        }
+        return {
+            "format": FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "model": info.name,
+            "parameters": parameters,
+            "scale_assumed": self.scale_assumed,
+            "offset": {"value": self.offset, "unit": "m", "fitted": self.offset_fitted},
+            "stroke": {"value": self.stroke, "unit": "m"},
+            "delay": {"value": self.delay, "unit": "s"} | delay,
+            "start": start_entry(self.start, self.drive_unit),
+            **drift_entry(self.drift),
+            **record_entries(self.records, self.drive_unit),
+            **details,
+        }
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the model to a JSON file that `load` reads back bit for bit.
@@ -462,39 +595,6 @@ class IdentifiedModel:
         for name in ("offset", "stroke", "delay"):
             sensor_number(name, getattr(self, name))
         return write_document(path, self.document())
-
-
-def load(path: str | os.PathLike[str]) -> IdentifiedModel:
-    """Read a model file.
-
-    Parameters
-    ----------
-    path : path-like
-        A file that `save` of an identified model wrote, with this version of piezotrack or an
-        older one.
-
-    Returns
-    -------
-    IdentifiedModel
-        The model, its numbers as they were saved, bit for bit.
-
-    Raises
-    ------
-    DataError
-        The file is missing, is not a model file, or was written by a newer version.
-
-    Examples
-    --------
-    >>> import piezotrack as pt
-    >>> model = pt.identification.IdentifiedModel(
-    ...     model=pt.DahlStage.xu_li_2010(), offset=0.0, offset_fitted=False, stroke=119e-6
-    ... )
-    >>> import os, tempfile
-    >>> path = model.save(os.path.join(tempfile.mkdtemp(), "dahl.json"))
-    >>> pt.load(path).model == model.model
-    True
-    """
-    return IdentifiedModel(**read_model(path))
 
 
 def _count(value: object) -> int:

@@ -1,8 +1,7 @@
-"""Model files: identified models as JSON, and the errors of files that cannot be read."""
+"""Reading of model files, and the errors of files that cannot be read."""
 
 from __future__ import annotations
 
-import math
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,39 +11,28 @@ from ..._support.json_text import number_pair, object_of, parse_json, text_of
 from ..._support.units import of_drive
 from ...errors import DataError, ParameterError, PiezotrackError
 from ...stages.registry import model_named, stage_class
-from .drift import drift_entry, drift_of
-from .fitted_record import record_entries, records_of_file
-from .notes import drive_rate, fit_percent
-from .start import start_entry, start_of
+from .drift import drift_of
+from .fitted_record import records_of_file
+from .identified_model import IdentifiedModel
+from .model_entries import FORMAT, SCHEMA_VERSION, SENSOR, drive_unit_of, sensor_number
+from .start import start_of
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
-    from ...data.dataset import Dataset
-    from ...stages.base import Stage, StageState
+    from ...stages.base import Stage
     from ...stages.model_info import ModelInfo
-    from .estimates import Constraint
+    from ...stages.motion import StageState
     from .fitted_record import FittedRecord
-    from .identified_model import IdentifiedModel
 
 __all__ = [
-    "constraint_entries",
-    "document_of",
-    "drive_unit_of",
     "entries_of",
-    "fit_entry",
-    "origin_of",
-    "parameter_entries",
-    "provenance",
+    "load",
     "read_content",
-    "read_model",
-    "sensor_number",
     "stage_of",
 ]
 
-FORMAT = "piezotrack-model"
-SCHEMA_VERSION = 2
 # Parameters of the model "prandtl-ishlinskii" by their names in version 1.
 NAMES_1 = {
     "corners": "dead_zone_thresholds",
@@ -65,75 +53,68 @@ OWN = {
     "drift",
     "records",
 }
-# Unit and limits of the numbers that go with a stage. What is beyond them is in another unit.
-SENSOR: dict[str, tuple[str, Callable[[float], bool], str]] = {
-    "offset": ("m", lambda value: abs(value) < 1.0, "a finite number between -1 and 1"),
-    "stroke": ("m", lambda value: value > 0.0, "a finite number above 0"),
-    "delay": ("s", lambda value: 0.0 <= value <= 1000.0, "a finite number from 0 to 1000"),
-}
 # Entries of a parameter that are not details of the fit.
 FACTS = ("value", "unit", "symbol")
 
 
-def document_of(model: IdentifiedModel) -> dict[str, Any]:
-    """Content of the file of a model.
+def load(path: str | os.PathLike[str]) -> IdentifiedModel:
+    """Read a model file.
 
     Parameters
     ----------
-    model : IdentifiedModel
-        The model.
+    path : path-like
+        A file that `save` of an identified model wrote, with this version of piezotrack or an
+        older one.
 
     Returns
     -------
-    dict
-        Of numbers, texts, lists and dicts only.
+    IdentifiedModel
+        The model, its numbers as they were saved, bit for bit.
+
+    Raises
+    ------
+    DataError
+        The file is missing, is not a model file, or was written by a newer version.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> model = pt.identification.IdentifiedModel(
+    ...     model=pt.DahlStage.xu_li_2010(), offset=0.0, offset_fitted=False, stroke=119e-6
+    ... )
+    >>> import os, tempfile
+    >>> path = model.save(os.path.join(tempfile.mkdtemp(), "dahl.json"))
+    >>> pt.load(path).model == model.model
+    True
     """
-    details, info = dict(model.details), model.model.info
-    found = details.pop("parameters", {})
-    delay = dict(details.pop("delay", {}))
-    parameters = {
-        name: entry | dict(found.get(name, {}))
-        for name, entry in parameter_entries(model.model, model.drive_unit).items()
-    }
-    return {
-        "format": FORMAT,
-        "schema_version": SCHEMA_VERSION,
-        "model": info.name,
-        "parameters": parameters,
-        "scale_assumed": model.scale_assumed,
-        "offset": {"value": model.offset, "unit": "m", "fitted": model.offset_fitted},
-        "stroke": {"value": model.stroke, "unit": "m"},
-        "delay": {"value": model.delay, "unit": "s"} | delay,
-        "start": start_entry(model.start, model.drive_unit),
-        **drift_entry(model.drift),
-        **record_entries(model.records, model.drive_unit),
-        **details,
-    }
-
-
-def parameter_entries(stage: Stage, drive: str) -> dict[str, dict[str, Any]]:
-    """Entries of a file on the parameters of a stage.
-
-    Parameters
-    ----------
-    stage : Stage
-        The stage.
-    drive : str
-        Unit of its drive.
-
-    Returns
-    -------
-    dict
-        Value, unit and symbol of each parameter, by its name.
-    """
-    return {
-        one.name: {
-            "value": _plain(getattr(stage, one.name)),
-            "unit": of_drive(one.unit, drive),
-            "symbol": one.symbol,
-        }
-        for one in stage.info.parameters
-    }
+    name, document = read_document(path)
+    try:
+        info = model_named(document.get("model"))
+    except ParameterError as error:
+        raise DataError(f"{name} holds a {str(error).replace(' is', '', 1)}") from None
+    with entries_of(name):
+        if document["schema_version"] == 1:
+            _from_version_1(document, searched=info.searched)
+        parameters = document["parameters"]
+        _check_origin(document.get("provenance"))
+        stage = stage_of(info, parameters, drive_unit_of(document, info))
+        delay = document["delay"]
+        return IdentifiedModel(
+            model=stage,
+            offset=file_number("offset", document["offset"]),
+            offset_fitted=_core.as_truth("offset fitted", document["offset"]["fitted"]),
+            scale_assumed=_core.as_truth("scale_assumed", document["scale_assumed"]),
+            stroke=file_number("stroke", document["stroke"]),
+            delay=file_number("delay", delay),
+            start=start_of(document.get("start"), stage_class(info)._state),
+            drift=drift_of(document.get("drift")),
+            records=_records(document, stage_class(info)._state),
+            details={
+                "parameters": {key: _fit_details(entry) for key, entry in parameters.items()},
+                "delay": _fit_details(delay),
+                **{key: value for key, value in document.items() if key not in OWN},
+            },
+        )
 
 
 def stage_of(info: ModelInfo, parameters: dict[str, Any], drive: str) -> Stage:
@@ -170,58 +151,6 @@ def stage_of(info: ModelInfo, parameters: dict[str, Any], drive: str) -> Stage:
     return stage_class(info)(**values)
 
 
-def _plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
-
-
-def read_model(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read a model file.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-
-    Returns
-    -------
-    dict
-        The fields of an `IdentifiedModel`.
-
-    Raises
-    ------
-    DataError
-        The file is missing, is not a model file, or was written by a newer version.
-    """
-    name, document = read_document(path)
-    try:
-        info = model_named(document.get("model"))
-    except ParameterError as error:
-        raise DataError(f"{name} holds a {str(error).replace(' is', '', 1)}") from None
-    with entries_of(name):
-        if document["schema_version"] == 1:
-            _from_version_1(document, searched=info.searched)
-        parameters = document["parameters"]
-        _check_origin(document.get("provenance"))
-        stage = stage_of(info, parameters, drive_unit_of(document, info))
-        delay = document["delay"]
-        return {
-            "model": stage,
-            "offset": file_number("offset", document["offset"]),
-            "offset_fitted": _core.as_truth("offset fitted", document["offset"]["fitted"]),
-            "scale_assumed": _core.as_truth("scale_assumed", document["scale_assumed"]),
-            "stroke": file_number("stroke", document["stroke"]),
-            "delay": file_number("delay", delay),
-            "start": start_of(document.get("start"), stage_class(info)._state),
-            "drift": drift_of(document.get("drift")),
-            "records": _records(document, stage_class(info)._state),
-            "details": {
-                "parameters": {key: _fit_details(entry) for key, entry in parameters.items()},
-                "delay": _fit_details(delay),
-                **{key: value for key, value in document.items() if key not in OWN},
-            },
-        }
-
-
 def _check_origin(found: Any) -> None:
     """Refuse entries on the record identified that cannot be used."""
     _check_record("provenance: data", object_of("provenance", found).get("data"))
@@ -245,26 +174,6 @@ def _records(document: Mapping[str, Any], state: type[StageState]) -> tuple[Fitt
     for i, one in enumerate(records):
         _check_record(f"records[{i}]: data", one.origin)
     return records
-
-
-def drive_unit_of(details: Mapping[str, Any], info: ModelInfo) -> str:
-    """Return the unit of the drive of a model: that of its record, or else that of its kind.
-
-    Parameters
-    ----------
-    details : mapping
-        Entries of its file.
-    info : ModelInfo
-        The kind.
-
-    Returns
-    -------
-    str
-        ``"V"``, ``"N"`` or ``"m"``.
-    """
-    origin = details.get("provenance") or {}
-    found = (origin.get("data") or {}).get("drive_unit")
-    return info.drive_unit if found is None else str(found)
 
 
 def _fit_details(entry: Mapping[str, Any]) -> dict[str, Any]:
@@ -363,79 +272,6 @@ def entries_of(name: str) -> Iterator[None]:
         raise DataError(f"{name}: {error}") from None
 
 
-def constraint_entries(constraints: Iterable[Constraint]) -> dict[str, Any]:
-    """Entries of a file on the inequalities of a fit; none where it had none.
-
-    Parameters
-    ----------
-    constraints : iterable of Constraint
-        The inequalities.
-
-    Returns
-    -------
-    dict
-        Of texts and truth values only.
-    """
-    found = [{"text": one.text, "active": one.active} for one in constraints]
-    return {"constraints": found} if found else {}
-
-
-def fit_entry(
-    cost: float, data: Dataset, with_priors: float | None = None, spread: float | None = None
-) -> dict[str, Any]:
-    """Entries of a file on the residual of a fit.
-
-    Parameters
-    ----------
-    cost : float
-        Its root mean square [m].
-    data : Dataset
-        The record.
-    with_priors : float or None, optional
-        What was minimised, where there were priors [m].
-    spread : float or None, optional
-        Standard deviation of the measured displacement [m]; that of the record where not given.
-
-    Returns
-    -------
-    dict
-        Of numbers, texts and dicts only.
-    """
-    spread = float(data.y.std()) if spread is None else spread
-    known = {} if with_priors is None else {"cost_with_priors": {"value": with_priors, "unit": "m"}}
-    return {
-        "cost": {"value": cost, "unit": "m"},
-        **known,
-        "fit_percent": {"value": fit_percent(cost, spread), "unit": "%"},
-    }
-
-
-def provenance(data: Dataset, **settings: Any) -> dict[str, Any]:
-    """Entries of a file on the origin of a model: version, record and settings."""
-    return {
-        "package": "piezotrack",
-        "version": _core.__version__,
-        **settings,
-        "data": origin_of(data),
-    }
-
-
-def origin_of(data: Dataset) -> dict[str, Any]:
-    """Entries of a file on a record."""
-    return {
-        "source": data.source,
-        "sha256": data.sha256,
-        "samples": len(data),
-        "warmup_samples": data.warmup,
-        "window_s": [float(data.t[0]), float(data.t[-1])],
-        "dt_s": data.dt,
-        "drive_range": [float(data.full.u.min()), float(data.full.u.max())],
-        "drive_rate": drive_rate(data.full.u, data.dt),
-        "drive_unit": data.drive_unit,
-        "hold": data.hold,
-    }
-
-
 def require_unit(name: str, entry: Mapping[str, Any], unit: str) -> None:
     """Refuse an entry that is in another unit than the one that is written."""
     if entry.get("unit") != unit:
@@ -446,30 +282,3 @@ def file_number(name: str, entry: Mapping[str, Any]) -> float:
     """Take offset, stroke or delay from the file."""
     require_unit(name, entry, SENSOR[name][0])
     return sensor_number(name, entry["value"])
-
-
-def sensor_number(name: str, value: object) -> float:
-    """Check a number of the sensor, when it is saved and when it is loaded.
-
-    Parameters
-    ----------
-    name : {"offset", "stroke", "delay"}
-        Which one.
-    value : object
-        Its value, SI.
-
-    Returns
-    -------
-    float
-        The value.
-
-    Raises
-    ------
-    ParameterError
-        It is no number that such a sensor can have.
-    """
-    unit, fits, expected = SENSOR[name]
-    number = _core.as_number(name, value)
-    if not (math.isfinite(number) and fits(number)):
-        raise ParameterError(f"{name} is {number} {unit}: expected {expected}")
-    return number

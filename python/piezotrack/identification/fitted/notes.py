@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "above_noise",
-    "beyond_fit",
+    "deviation_of",
+    "drift_notes",
     "drive_rate",
+    "extrapolation_notes",
     "first_samples",
     "fit_percent",
-    "of_drift",
-    "of_lags",
-    "of_start",
-    "spread_of",
+    "lag_notes",
+    "start_notes",
 ]
 
 # A residual of so many times the noise is not due to the noise.
@@ -68,7 +68,7 @@ def fit_percent(rms: float, spread: float) -> float:
     return 100.0 * (1.0 - rms / spread) if spread else -math.inf
 
 
-def spread_of(records: Sequence[tuple[Dataset, float]]) -> float:
+def deviation_of(records: Sequence[tuple[Dataset, float]]) -> float:
     """Return the standard deviation of measured displacements, each about its own mean [m].
 
     Parameters
@@ -117,7 +117,7 @@ all of the motion']
     ]
 
 
-def of_drift(drift: Drift | None, stroke: float) -> list[str]:
+def drift_notes(drift: Drift | None, stroke: float) -> list[str]:
     """Say that a drift is large for one.
 
     Parameters
@@ -159,7 +159,7 @@ def drive_rate(u: Array, dt: float) -> float:
     return float(np.quantile(np.abs(np.diff(u)), 0.999)) / dt if u.size > 1 else 0.0
 
 
-def beyond_fit(
+def extrapolation_notes(
     u: Array,
     dt: float | None,
     fitted: tuple[float, float] | None,
@@ -188,7 +188,7 @@ def beyond_fit(
 
     Examples
     --------
-    >>> beyond_fit(np.array([0.0, 90.0]), 1.0, (0.0, 75.0), None)
+    >>> extrapolation_notes(np.array([0.0, 90.0]), 1.0, (0.0, 75.0), None)
     ['the drive goes from 0 to 90 V, that of the record identified from 0 to 75 V']
     """
     remarks = []
@@ -209,7 +209,7 @@ def beyond_fit(
     return remarks
 
 
-def of_start(start: Start | None, data: Dataset) -> str | None:
+def start_notes(start: Start | None, data: Dataset) -> str | None:
     """Say what the stage went through before the record.
 
     Parameters
@@ -237,7 +237,7 @@ def of_start(start: Start | None, data: Dataset) -> str | None:
     return f"in equilibrium at {drive_text(first, unit)}, {before}"
 
 
-def of_lags(lags: LagRange | None, frequency: float) -> list[str]:
+def lag_notes(lags: LagRange | None, frequency: float) -> list[str]:
     """Say which lags the record allows.
 
     Parameters

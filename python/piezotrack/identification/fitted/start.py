@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
-    from ...stages.base import Stage, StageState
+    from ...stages.base import Stage
+    from ...stages.motion import StageState
 
     Array = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -199,7 +199,6 @@ def _with(model: IdentifiedModel, values: list[_Value], by: Array) -> Identified
 
 def _plain(model: IdentifiedModel) -> IdentifiedModel:
     """Return an identified model without the search that found it."""
-    names = IdentifiedModel.__dataclass_fields__
-    given = {name: getattr(model, name) for name in names}
+    given = {one.name: getattr(model, one.name) for one in fields(IdentifiedModel)}
     document = {} if type(model) is IdentifiedModel else model.document()
     return IdentifiedModel(**{**given, "details": given["details"] or document})

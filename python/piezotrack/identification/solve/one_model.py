@@ -10,9 +10,10 @@ from ..._support.messages import quoted
 from ..._support.progress_bar import ProgressBar
 from ...errors import Interrupted, ParameterError
 from ..fitted.start import GAIN
+from ..methods.least_squares import LeastSquares
 from .earlier_motion import other_histories
 from .search import search_records
-from .weights import LeastSquares, solve_least_squares
+from .weights import solve_least_squares
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

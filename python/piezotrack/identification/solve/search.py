@@ -16,8 +16,8 @@ from ..fitted.drift import Drift
 from ..fitted.estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
 from ..fitted.fitted_record import FittedRecord
 from ..fitted.identification import Identification
-from ..fitted.model_file import constraint_entries, fit_entry, origin_of, provenance
-from ..fitted.notes import spread_of
+from ..fitted.model_entries import constraint_entries, fit_entry, origin_of, provenance
+from ..fitted.notes import deviation_of
 from ..fitted.start import start_after
 from ..methods.descents import Descents
 from ..methods.particle_swarm import ParticleSwarm
@@ -159,7 +159,7 @@ def _identification(
     )
     first, data = fitted[0], records[0].data
     parameters |= first.parameters
-    spread = spread_of([(one.data, one.weight) for one in records])
+    spread = deviation_of([(one.data, one.weight) for one in records])
     constraints = tuple(Constraint(*one) for one in found.constraints)
     details: dict[str, Any] = {
         "parameters": {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..._support.messages import quoted
 from ..._support.statistics import sample_noise
 from ...errors import DataError, NumericalError, ParameterError
 from ...stages.registry import model_named
+from ..fitted.trial import Trial
 from ..methods.particle_swarm import ParticleSwarm
 from ..problem.parameters import ON_PARAMETERS
 from .one_model import check_counts, identify_kind
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AUTO",
-    "Trial",
     "identify_best",
     "is_white",
     "kinds_tried",
@@ -60,23 +60,6 @@ BETTER = 0.03
 # The descent finds the bottom: swarms that only have to find the basin can be short, and those
 # that only have to tell the kinds apart few.
 ITERATIONS, RUNS = 40, 2
-
-
-class Trial(NamedTuple):
-    """One kind of stage that was tried.
-
-    Attributes
-    ----------
-    model, title : str
-        Name of the model, and its title.
-    rms : float
-        Root mean square of the residual on the part that was not fitted [m]; where the record is
-        too short to be parted, on all of it.
-    """
-
-    model: str
-    title: str
-    rms: float
 
 
 def identify_best(

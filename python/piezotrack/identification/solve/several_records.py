@@ -11,11 +11,11 @@ import numpy as np
 from ..._support.statistics import sample_noise
 from ...errors import DataError, NumericalError
 from ..fitted.start import GAIN
+from ..fitted.trial import Trial
 from .one_model import identify_weights
 from .search import search_records
 from .selection import (
     AS_NOISE,
-    Trial,
     best_of,
     is_white,
     kinds_tried,

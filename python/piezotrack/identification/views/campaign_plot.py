@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._support.plot_style import GUIDE, MODELS, few_ticks, folded, heading, literal, panels, whole
-from .campaign_report import size_of
+from ..campaigns.result import size_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

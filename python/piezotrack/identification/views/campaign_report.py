@@ -5,16 +5,21 @@ from __future__ import annotations
 from statistics import median
 from typing import TYPE_CHECKING
 
-from ..._support.html_table import html_table
+from ..._support.table import Column, Table, words
+from ..campaigns.result import size_of
 
 if TYPE_CHECKING:
     from ..campaigns.result import Campaign, TaskResult
 
-__all__ = ["campaign_html", "campaign_text", "size_of"]
+__all__ = ["campaign_html", "campaign_text"]
 
 # Lines of the table, and of tasks without a model.
 MOST_ROWS, MOST_FAILED = 60, 20
-HEADS = ("record", "model", "seeds", "lowest", "median", "highest", "agree", "found")
+COLUMNS = (
+    *(Column(head, left=True) for head in ("record", "model")),
+    *(Column(head, before=3) for head in ("seeds", "lowest", "median", "highest", "agree")),
+    Column("found", left=True),
+)
 NOTES = """\
 rms on what was fitted, in % of the stroke, of the seeds; agree: seeds within 0.1 % of the lowest.
 More parameters always fit better: to choose a model, judge it on what was not fitted (compare)."""
@@ -33,15 +38,8 @@ def campaign_text(campaign: Campaign) -> str:
     str
         Several lines.
     """
-    rows = [_row(*key, group) for key, group in campaign.groups.items()]
-    shown = [HEADS, *rows[:MOST_ROWS]]
-    widths = [max(len(row[i]) for row in shown) for i in range(len(HEADS))]
-    lines = [_heading(campaign), ""]
-    for row in shown:
-        words = [row[i].ljust(widths[i]) for i in (0, 1)]
-        figures = [row[i].rjust(widths[i] + 1) for i in range(2, 7)]
-        lines.append("  ".join(["", *words, *figures, row[7]]).rstrip())
-    if (more := len(rows) - MOST_ROWS) > 0:
+    lines = [_heading(campaign), "", *_table(campaign).lines()]
+    if (more := len(campaign.groups) - MOST_ROWS) > 0:
         lines.append(f"  and {more} more: to_frame() has them all")
     failed = _failed(campaign)
     lines += ["", *(f"failed  {name}: {error}" for name, error in failed[:MOST_FAILED])]
@@ -56,25 +54,21 @@ def campaign_text(campaign: Campaign) -> str:
 
 def campaign_html(campaign: Campaign) -> str:
     """Write a campaign as a table of HTML, with the tasks without a model below."""
-    rows = [_row(*key, group) for key, group in campaign.groups.items()]
-    tables = [html_table(_heading(campaign), rows[:MOST_ROWS], HEADS)]
+    tables = [_table(campaign)]
     if failed := _failed(campaign):
-        tables.append(html_table("Tasks without a model", failed[:MOST_FAILED]))
-    return "".join(tables)
+        tables.append(words("Tasks without a model", failed[:MOST_FAILED]))
+    return "".join(table.html() for table in tables)
+
+
+def _table(campaign: Campaign) -> Table:
+    rows = [_row(*key, group) for key, group in list(campaign.groups.items())[:MOST_ROWS]]
+    return Table(COLUMNS, rows, _heading(campaign))
 
 
 def _agreeing(group: list[TaskResult]) -> int:
     """Count the seeds within 0.1 % of the lowest cost; those below 0.001 % of stroke are equal."""
     costs = [one.rms_percent for one in group if one.error is None]
     return sum(cost <= max(1.001 * min(costs), 1e-3) for cost in costs)
-
-
-def size_of(campaign: Campaign) -> str:
-    """Count records, models and tasks in words."""
-    counts = {"record": len(campaign.records), "model": len(campaign.models), "task": len(campaign)}
-    words = [f"{n} {word}" if n == 1 else f"{n} {word}s" for word, n in counts.items()]
-    failed = [f"{len(campaign.failed)} without a model"] if campaign.failed else []
-    return ", ".join([*words, *failed])
 
 
 def _heading(campaign: Campaign) -> str:

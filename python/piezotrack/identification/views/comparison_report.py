@@ -1,20 +1,36 @@
-"""The table of a comparison of models."""
+"""Table of a comparison of models, as text and as a notebook shows it."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..._support.table import Column, Table
+
 if TYPE_CHECKING:
     from ...data.dataset import Dataset
     from ..comparison.compare import Comparison, ModelScore
 
-__all__ = ["comparison_text"]
+__all__ = ["comparison_html", "comparison_text"]
 
 NOTES = """\
 * best on the part not fitted, which is the figure to trust. fit %: 100 (1 - |error| / |y - mean|).
 K: values fitted, - for a model that was given. dAIC, dBIC: above the lowest. Both assume
 independent residuals; where r1, the correlation of neighbouring ones, is near 1, they favour too
 many parameters (Burnham and Anderson 2002, doi 10.1007/b97636)."""
+ERRORS = (
+    Column("rms", "um", ".4g", 9, 0),
+    Column("rms", "%", ".3g", 8, 0),
+    Column("rms", "um", ".4g", 10, 0),
+    Column("rms", "%", ".3g", 8, 0),
+    Column("max", "um", ".4g", 9, 0),
+    Column("fit", "%", ".4g", 8, 0),
+)
+CRITERIA = (
+    Column("K", width=6, before=0),
+    Column("dAIC", width=11, before=0),
+    Column("dBIC", width=11, before=0),
+    Column("r1", "", ".3f", 9, 0),
+)
 
 
 def comparison_text(comparison: Comparison) -> str:
@@ -43,38 +59,56 @@ def comparison_text(comparison: Comparison) -> str:
         f"per cent of the stroke fitted, {1e6 * comparison.train.stroke:.4g} um",
         "",
         f"  {'':<{width}}{'fitted':>12}{'not fitted':>20}",
-        f"  {'model':<{width}}{'rms um':>9}{'rms %':>8}{'rms um':>10}{'rms %':>8}{'max um':>9}"
-        f"{'fit %':>8}",
-        *(f"{_mark(comparison, row)} {row.title:<{width}}{_errors(row)}" for row in rows),
+        *Table(
+            (Column(width=1, before=0), Column("model", width=width, before=1, left=True), *ERRORS),
+            [(_mark(comparison, row), row.title, *_errors(row)) for row in rows],
+        ).lines(),
         "",
-        f"  {'':<{width}}{'K':>6}{'dAIC':>11}{'dBIC':>11}{'r1':>9}",
-        *(f"  {row.title:<{width}}{_criteria(row, aic, bic)}" for row in rows),
+        *Table(
+            (Column(width=width, left=True), *CRITERIA),
+            [(row.title, *_criteria(row, aic, bic)) for row in rows],
+        ).lines(),
     ]
     lines += ["", *(f"note  {note}" for note in comparison.notes)] if comparison.notes else []
-    return "\n".join([*(line.rstrip() for line in lines), "", NOTES])
+    return "\n".join([*lines, "", NOTES])
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Write the errors of each model; the best on what was not fitted in bold."""
+    rows = [
+        (row.title, *(value for score in (row.train, row.test) for value in
+                      (1e6 * score.rms, score.rms_percent, 1e6 * score.max_error)))
+        for row in comparison.rows
+    ]  # fmt: skip
+    errors = (("rms", "um", ".4g"), ("rms", "% of stroke", ".3g"), ("largest", "um", ".4g"))
+    columns = [Column(f"{part}: {name}", unit, form)
+               for part in ("fitted", "not fitted") for name, unit, form in errors]  # fmt: skip
+    best = comparison.rows.index(comparison.best)
+    return Table([Column("model"), *columns], rows, "Comparison").html(bold=best)
 
 
 def _mark(comparison: Comparison, row: ModelScore) -> str:
     return "*" if row is comparison.best else " "
 
 
-def _errors(row: ModelScore) -> str:
-    """Write the errors of one model on both parts."""
+def _errors(row: ModelScore) -> tuple[float, ...]:
+    """Return the errors of one model on both parts, for `ERRORS`."""
     fitted, test = row.train, row.test
     return (
-        f"{1e6 * fitted.rms:>9.4g}{fitted.rms_percent:>8.3g}"
-        f"{1e6 * test.rms:>10.4g}{test.rms_percent:>8.3g}{1e6 * test.max_error:>9.4g}"
-        f"{test.fit_percent:>8.4g}"
+        1e6 * fitted.rms,
+        fitted.rms_percent,
+        1e6 * test.rms,
+        test.rms_percent,
+        1e6 * test.max_error,
+        test.fit_percent,
     )
 
 
-def _criteria(row: ModelScore, aic: float, bic: float) -> str:
-    """Write the number of values fitted, and the criteria above their lowest."""
+def _criteria(row: ModelScore, aic: float, bic: float) -> tuple[object, ...]:
+    """Return the number of values fitted, and the criteria above their lowest."""
     if row.parameters is None or row.aic is None or row.bic is None:
-        figures = f"{'-':>6}{'-':>11}{'-':>11}"
-    else:
-        figures = f"{row.parameters:>6}{_above(row.aic, aic):>11}{_above(row.bic, bic):>11}"
-    return f"{figures}{row.autocorrelation:>9.3f}"
+        return None, None, None, row.autocorrelation
+    return row.parameters, _above(row.aic, aic), _above(row.bic, bic), row.autocorrelation
 
 
 def _above(value: float, lowest: float) -> str:

@@ -1,20 +1,19 @@
-"""A fit and a comparison as tables, as a notebook shows them."""
+"""A fit as tables, as a notebook shows it."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
-from ..._support.html_table import html_table
-from .report import said_of
+from ..._support.table import words
+from .report import parameter_notes
 
 if TYPE_CHECKING:
     from ...data.dataset import Dataset
-    from ..comparison.compare import Comparison
     from ..fitted.estimates import Constraint, Estimate
     from ..fitted.identification import Identification
 
-__all__ = ["comparison_html", "identification_html"]
+__all__ = ["identification_html"]
 
 
 def identification_html(fit: Identification) -> str:
@@ -35,13 +34,13 @@ def identification_html(fit: Identification) -> str:
             rows.append(("drift", str(fit.drift)))
     rows += [("constraint", _constraint(one)) for one in fit.constraints]
     rows += [("note", note) for note in fit.notes]
-    tables = [html_table(f"Identification: {fit.model.info.title}", rows)]
+    tables = [words(f"Identification: {fit.model.info.title}", rows).html()]
     if len(fit.records) > 1:
         tables.append(_records(fit))
     if fit.parameters:
         found = [_estimate(fit, name, one) for name, one in fit.parameters.items()]
         heads = ("parameter", "symbol", "value", "unit", "standard deviation")
-        tables.append(html_table("Parameters", found, heads))
+        tables.append(words("Parameters", found, heads).html())
     return "".join(tables)
 
 
@@ -74,7 +73,7 @@ def _records(fit: Identification) -> str:
         )
         for i, (one, score) in enumerate(zip(fit.records, fit.scores, strict=True))
     ]
-    return html_table("Records", rows, heads)
+    return words("Records", rows, heads).html()
 
 
 def _estimate(fit: Identification, name: str, one: Estimate) -> tuple[str, ...]:
@@ -84,34 +83,8 @@ def _estimate(fit: Identification, name: str, one: Estimate) -> tuple[str, ...]:
         deviation = "unknown"
     else:
         deviation = f"{one.deviation:.2g}" if math.isfinite(one.deviation) else "no effect"
-    return name, one.symbol, f"{one.value:.6g}", one.unit, deviation + said_of(fit, name)
+    return name, one.symbol, f"{one.value:.6g}", one.unit, deviation + parameter_notes(fit, name)
 
 
 def _constraint(one: Constraint) -> str:
     return one.text + (", active" if one.active else "")
-
-
-def comparison_html(comparison: Comparison) -> str:
-    """Write the errors of each model; the best on what was not fitted in bold."""
-    rows = [
-        (
-            row.title,
-            *(
-                cell
-                for score in (row.train, row.test)
-                for cell in (
-                    f"{1e6 * score.rms:.4g}",
-                    f"{score.rms_percent:.3g}",
-                    f"{1e6 * score.max_error:.4g}",
-                )
-            ),
-        )
-        for row in comparison.rows
-    ]
-    heads = (
-        "model",
-        *(f"{part}: {what}" for part in ("fitted", "not fitted")
-          for what in ("rms [um]", "rms [% of stroke]", "largest [um]")),
-    )  # fmt: skip
-    best = comparison.rows.index(comparison.best)
-    return html_table("Comparison", rows, heads, bold=best)

@@ -29,7 +29,7 @@ from ..._support.plot_style import (
 from ..._support.units import best_length_unit, shown_unit
 from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
-from ...stages.base import Response
+from ...stages.motion import Response
 from ..fitted.identification import Identification
 
 if TYPE_CHECKING:
@@ -40,18 +40,21 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..fitted.fitted_record import FittedRecord
+    from ..fitted.identified_model import IdentifiedModel
 
     Array = NDArray[np.float64]
 
 __all__ = [
     "named",
     "plot_convergence",
-    "plot_identification",
     "plot_loop",
+    "plot_model",
+    "plot_model_loop",
+    "plot_model_time",
     "plot_response",
     "plot_time",
     "what_was_fitted",
-    "what_was_not_fitted",
+    "what_was_shown",
 ]
 
 
@@ -83,17 +86,6 @@ def plot_loop(
     -------
     matplotlib.axes.Axes
         The axes drawn on.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> log = pt.datasets.dbo_training()[3.0:8.0]
-    >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
-    >>> run = fit.simulate(log, offset=fit.offset)
-    >>> ax = pt.identification.plot_loop(log, run, ax=Figure().subplots())
-    >>> ax.get_xlabel(), ax.get_ylabel()
-    ('drive [V]', 'displacement [um]')
     """
     _check(data, run)
     (ax,) = axes_or_new(ax, 1)
@@ -140,17 +132,6 @@ def plot_time(
     -------
     tuple of two matplotlib.axes.Axes
         Displacement, error.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> log = pt.datasets.dbo_training()[3.0:8.0]
-    >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
-    >>> run = fit.simulate(log, offset=fit.offset)
-    >>> above, below = pt.identification.plot_time(log, run, axes=Figure().subplots(2, 1))
-    >>> below.get_ylabel()
-    'error [nm]'
     """
     _check(data, run)
     stroke = data.stroke if stroke is None else positive("stroke", stroke, "m")
@@ -204,19 +185,13 @@ def plot_convergence(
     matplotlib.axes.Axes
         The axes drawn on.
 
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> log, few = pt.datasets.dbo_training()[3.0:5.0], pt.ParticleSwarm(iterations=3)
-    >>> fit = pt.identify(log, "dahl", swarm=few, runs=1, seed=1, progress=False)
-    >>> ax = pt.identification.plot_convergence(fit, ax=Figure().subplots())
-    >>> ax.get_ylabel()
-    'best cost, rms [um]'
+    Raises
+    ------
+    ParameterError
+        The model was not searched.
     """
-    expect("fit", fit, Identification, "what pt.identify returns")
     if not fit.history.size:
-        raise ParameterError("fit was found by least squares: expected one that was searched")
+        raise ParameterError("the model was fitted by least squares: expected one of a search")
     (ax,) = axes_or_new(ax, 1)
     # A cost of 0 has no place on a logarithmic scale.
     shown = np.isfinite(fit.history) & (fit.history > 0.0)
@@ -295,17 +270,17 @@ def plot_response(
     return whole(figure)
 
 
-def plot_identification(
-    fit: Identification, data: Dataset | None = None, fig: Figure | SubFigure | None = None
+def plot_model(
+    model: IdentifiedModel, data: Dataset | None = None, fig: Figure | SubFigure | None = None
 ) -> Figure:
     """Draw loop, displacement, error and, after a search, convergence in one figure.
 
     Parameters
     ----------
-    fit : Identification
-        What a fit found.
+    model : IdentifiedModel
+        The model.
     data : Dataset, optional
-        Another record to show the model on.
+        The record to show it on; that of the fit where not given.
     fig : matplotlib.figure.Figure or SubFigure, optional
         Where to draw; a new figure where not given.
 
@@ -313,24 +288,51 @@ def plot_identification(
     -------
     matplotlib.figure.Figure
         The figure drawn in, with four panels or three.
+
+    Raises
+    ------
+    ParameterError
+        There is no record.
     """
-    if data is None and len(fit.records) > 1:
+    fit = model if isinstance(model, Identification) else None
+    if fit is not None and data is None and len(fit.records) > 1:
         return _of_records(fit, fig)
-    own = data is None
-    record = fit.data if data is None else data
-    run = fit.simulate(record, offset=fit.offset if own else "own")
-    searched = fit.model.info.searched
+    record, run = _shown(model, data)
+    searched = fit is not None and fit.model.info.searched
     figure = panels(fig, (11.0, 6.6 if searched else 5.6))
     grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
     plot_loop(record, run, figure.add_subplot(grid[0 if searched else slice(None), 0]))
-    if searched:
+    if fit is not None and searched:
         plot_convergence(fit, figure.add_subplot(grid[1, 0]))
     above = figure.add_subplot(grid[0, 1])
     below = figure.add_subplot(grid[1, 1], sharex=above)
-    plot_time(record, run, (above, below), stroke=fit.stroke)
-    title = what_was_fitted(fit) if own else what_was_not_fitted(fit, record, run)
-    figure.suptitle(title, fontsize="large")
+    plot_time(record, run, (above, below), stroke=model.stroke)
+    title = what_was_shown(model, record, run)
+    figure.suptitle(what_was_fitted(fit) if fit and data is None else title, fontsize="large")
     return whole(figure)
+
+
+def plot_model_loop(
+    model: IdentifiedModel, data: Dataset | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw the loop of a model on a record, as `plot_loop`."""
+    return plot_loop(*_shown(model, data), ax)
+
+
+def plot_model_time(
+    model: IdentifiedModel, data: Dataset | None = None, axes: Sequence[Axes] | None = None
+) -> tuple[Axes, Axes]:
+    """Draw displacement and error of a model on a record, as `plot_time`."""
+    return plot_time(*_shown(model, data), axes, stroke=model.stroke)
+
+
+def _shown(model: IdentifiedModel, data: Dataset | None) -> tuple[Dataset, Response]:
+    """Return the record on which a model is shown, and its response there."""
+    if data is not None:
+        return data, model.simulate(data)
+    if not isinstance(model, Identification):
+        raise ParameterError("data is None: expected a record, as a model from a file has none")
+    return model.data, model.simulate(model.data, offset=model.offset)
 
 
 def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
@@ -372,13 +374,14 @@ def what_was_fitted(fit: Identification, own: FittedRecord | None = None) -> str
     return f"{named(fit, record)}: {own.cost_percent:.3g} % of stroke rms"
 
 
-def what_was_not_fitted(fit: Identification, record: Dataset, run: Response) -> str:
-    """Write model, record, window and error on another record, as the title of its pictures."""
-    rms = 100.0 * float(np.sqrt(np.mean((record.y - run.x) ** 2))) / fit.stroke
-    return f"{named(fit, record)}, not fitted: {rms:.3g} % of stroke rms"
+def what_was_shown(model: IdentifiedModel, record: Dataset, run: Response) -> str:
+    """Write model, record, window and error on any record, as the title of its pictures."""
+    rms = 100.0 * float(np.sqrt(np.mean((record.y - run.x) ** 2))) / model.stroke
+    fitted = "" if model.fitted_on(record) else ", not fitted"
+    return f"{named(model, record)}{fitted}: {rms:.3g} % of stroke rms"
 
 
-def named(fit: Identification, record: Dataset) -> str:
+def named(fit: IdentifiedModel, record: Dataset) -> str:
     """Write model, record and window."""
     first, last = float(record.t[0]), float(record.t[-1]) + record.dt
     source = literal(record.source) if record.source else "the record"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..._support.files import make_folder, picture_files, save_figures, together
 from ..._support.units import of_drive, shown_unit
-from ..fitted.notes import of_start
+from ..fitted.notes import start_notes
 
 if TYPE_CHECKING:
     import os
@@ -18,8 +18,15 @@ if TYPE_CHECKING:
     from ...stages.model_info import Parameter
     from ..fitted.estimates import Estimate
     from ..fitted.identification import Identification
+    from ..fitted.identified_model import IdentifiedModel
 
-__all__ = ["identification_files", "said_of", "save_identification", "summary_text"]
+__all__ = [
+    "identification_files",
+    "model_text",
+    "parameter_notes",
+    "save_identification",
+    "summary_text",
+]
 
 # Units of values that a stage gives in um, and the factor for a drive in metres.
 PER_METRE = {"um/V": ("um/um", 1e-6), "1/V": ("1/um", 1e-6)}
@@ -55,6 +62,31 @@ def summary_text(fit: Identification) -> str:
     )
 
 
+def model_text(model: IdentifiedModel) -> str:
+    """Write a model without its record, as one from a file, as a table.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+
+    Returns
+    -------
+    str
+        Several lines.
+    """
+    info, origin = model.model.info, model.details.get("provenance") or {}
+    source = (origin.get("data") or {}).get("source") or "a record"
+    lines = [f"{info.title}: stage identified from {source}, stroke {1e6 * model.stroke:.4g} um"]
+    if model.offset_fitted:
+        lines.append(f"      offset {1e6 * model.offset:.5g} um fitted")
+    if model.drift:
+        lines.append(f"      {model.drift}")
+    if model.delay:
+        lines.append(f"      delay {1e3 * model.delay:.4g} ms")
+    return "\n".join([*lines, "", *_values(model, info.parameters)])
+
+
 def _of_one(fit: Identification) -> list[str]:
     """Say from which record, and what is left of it."""
     data = fit.data
@@ -68,7 +100,7 @@ def _of_one(fit: Identification) -> list[str]:
         lines.append(f"      {fit.drift}")
     if fit.delay and "delay" not in fit.parameters:
         lines.append(f"      delay {1e3 * fit.delay:.4g} ms")
-    if begun := of_start(fit.start, data):
+    if begun := start_notes(fit.start, data):
         lines.append(f"      the record begins {begun}")
     return lines
 
@@ -96,7 +128,7 @@ def _of_several(fit: Identification) -> list[str]:
         ]
         if one.drift:
             lines.append(f"      {one.drift}")
-        if begun := of_start(one.start, one.data):
+        if begun := start_notes(one.start, one.data):
             lines.append(f"      it begins {begun}")
     return lines
 
@@ -155,7 +187,7 @@ def _estimates(fit: Identification) -> list[str]:
     return lines
 
 
-def _values(fit: Identification, parameters: Iterable[Parameter]) -> list[str]:
+def _values(fit: IdentifiedModel, parameters: Iterable[Parameter]) -> list[str]:
     """List the values of the parameters, lists of one length side by side in pairs."""
     lines, parts = ["parameters"], list(parameters)
     while parts:
@@ -178,17 +210,17 @@ def _values(fit: Identification, parameters: Iterable[Parameter]) -> list[str]:
     return lines
 
 
-def _shown(fit: Identification, one: Parameter) -> tuple[str, float]:
+def _shown(fit: IdentifiedModel, one: Parameter) -> tuple[str, float]:
     """Return the unit in which a parameter is shown, and the factor from SI."""
-    return shown_unit(of_drive(one.unit, fit.data.drive_unit))
+    return shown_unit(of_drive(one.unit, fit.drive_unit))
 
 
-def _heading(fit: Identification, one: Parameter) -> str:
+def _heading(fit: IdentifiedModel, one: Parameter) -> str:
     unit, _ = _shown(fit, one)
     return f"{one.name} {one.symbol}" + (f" [{unit}]" if unit else "")
 
 
-def _scaled(fit: Identification, one: Parameter) -> list[float]:
+def _scaled(fit: IdentifiedModel, one: Parameter) -> list[float]:
     _, scale = _shown(fit, one)
     return [scale * number for number in getattr(fit.model, one.name)]
 
@@ -255,8 +287,8 @@ def _constraints(fit: Identification) -> list[str]:
     return ["", "constraints", *rows]
 
 
-def said_of(fit: Identification, name: str) -> str:
-    """Write what a caller said of a parameter besides value and bounds, and what it met.
+def parameter_notes(fit: Identification, name: str) -> str:
+    """Write scale, tie, prior and active bound of a parameter.
 
     Parameters
     ----------
@@ -297,7 +329,7 @@ def _row(fit: Identification, name: str, estimate: Estimate, width: int) -> str:
         share = 100 * estimate.deviation / abs(estimate.value) if estimate.value else math.inf
         digits = f"{share:.2g}" if share < 10 else f"{share:.0f}"
         note = f"{digits} %" if share < 100 else "larger than the value"
-    note += said_of(fit, name)
+    note += parameter_notes(fit, name)
     return (
         f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
     ).rstrip()

@@ -53,17 +53,6 @@ def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
     ------
     ParameterError
         The readings were entered by hand.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> u = np.where(np.arange(1600) < 100, 0.0, 75.0)
-    >>> step = pt.identify_step(pt.VirtualStage.xu_li_2010(seed=1).record(u, 2e-4, hold="zoh"))
-    >>> ax = pt.identification.plot_step(step, ax=Figure().subplots())
-    >>> ax.get_xlabel()
-    'time after the step [ms]'
     """
     trace, (ax,) = _trace(step), axes_or_new(ax, 1)
     read = step.readings
@@ -121,17 +110,6 @@ def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
     ------
     ParameterError
         The readings were entered by hand.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from matplotlib.figure import Figure
-    >>> import piezotrack as pt
-    >>> u = np.where(np.arange(1600) < 100, 0.0, 75.0)
-    >>> step = pt.identify_step(pt.VirtualStage.xu_li_2010(seed=1).record(u, 2e-4, hold="zoh"))
-    >>> ax = pt.identification.plot_spectrum(step, ax=Figure().subplots())
-    >>> ax.get_ylabel()
-    'gain [um/V]'
     """
     trace, (ax,) = _trace(step), axes_or_new(ax, 1)
     read = step.readings

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..._support.table import Column, Table
 from ..._support.units import drive_text, of_drive, shown_unit
 
 if TYPE_CHECKING:
     from ..experiments.step_response import StepResult
 
 __all__ = ["step_text"]
+
+# Name, value, unit, equation.
+COLUMNS = (
+    Column(width=17, left=True),
+    Column(width=14, before=0),
+    Column(width=17, left=True),
+    Column(before=0, left=True),
+)
 
 
 def step_text(step: StepResult) -> str:
@@ -33,46 +42,47 @@ def step_text(step: StepResult) -> str:
         where = f"{trace.data.source or 'a record'}, step at {trace.step_time:.4g} s"
     unit = "V" if trace is None else trace.data.drive_unit
     per_drive, scale = shown_unit(of_drive("m/V", unit))
+    units = {"a1": ("1/m", "(9), (13)"), "a2": ("1/m^2", "(10)"), "b1": ("N/m^2", "(11)")}
+    units["b0"] = ("N/m", "(12)")
+    gains = f"{scale * read.static_gain:.4f}, {scale * read.resonance_gain:.4f}"
+    ratio = step.ratios
     lines = [
         f"Step response of {where}: {drive_text(read.voltage, unit)}",
         *(f"note  {note}" for note in step.notes),
         "",
         "readings",
-        _row("steady state", f"{1e6 * read.steady_state:.4f}", "um"),
-        _row("overshoot peaks", peaks + more, "um"),
-        _row("overshoot ratio", f"{100 * step.overshoot_ratio:.1f}", "% of the steady state"),
-        _row("period Td", f"{1e3 * read.period:.4g}", f"ms, {1 / read.period:.4g} Hz"),
-        _row("resonance", f"{read.frequency:.4g}", "Hz"),
-        _row(
-            "gains",
-            f"{scale * read.static_gain:.4f}, {scale * read.resonance_gain:.4f}",
-            f"{per_drive}, static and at the resonance",
+        *_rows(
+            ("steady state", f"{1e6 * read.steady_state:.4f}", "um"),
+            ("overshoot peaks", peaks + more, "um"),
+            ("overshoot ratio", f"{100 * step.overshoot_ratio:.1f}", "% of the steady state"),
+            ("period Td", f"{1e3 * read.period:.4g}", f"ms, {1 / read.period:.4g} Hz"),
+            ("resonance", f"{read.frequency:.4g}", "Hz"),
+            ("gains", gains, f"{per_drive}, static and at the resonance"),
         ),
         "",
         "the mode",
-        _row("wn", f"{step.natural_angular_frequency:.5g}", "rad/s", "(5)"),
-        _row("zeta", f"{step.damping_ratio:.4g}", "by the gains", "(4)"),
-        _row("", f"{step.damping_by_decrement:.4g}", "by the logarithmic decrement"),
-        _row("tau", f"{1e3 * step.time_constant:.4g}", "ms", "(6)"),
+        *_rows(
+            ("wn", f"{step.natural_angular_frequency:.5g}", "rad/s", "(5)"),
+            ("zeta", f"{step.damping_ratio:.4g}", "by the gains", "(4)"),
+            ("", f"{step.damping_by_decrement:.4g}", "by the logarithmic decrement"),
+            ("tau", f"{1e3 * step.time_constant:.4g}", "ms", "(6)"),
+        ),
         "",
         "the Dahl operator, read in time and used along the displacement, as the paper does",
-    ]
-    units = {"a1": ("1/m", "(9), (13)"), "a2": ("1/m^2", "(10)"), "b1": ("N/m^2", "(11)")}
-    units["b0"] = ("N/m", "(12)")
-    lines += [_row(name, f"{value:.7g}", *units[name]) for name, value in step.hysteresis.items()]
-    ratio = step.ratios
-    lines += [
+        *_rows(*((name, f"{x:.7g}", *units[name]) for name, x in step.hysteresis.items())),
         "",
         "ratios that one step determines",
-        _row("K/M", f"{ratio['K/M']:.5g}", "1/s^2"),
-        _row("D/M", f"{ratio['D/M']:.5g}", "1/s"),
-        _row("T/K", f"{scale * ratio['T/K']:.5g}", per_drive),
+        *_rows(
+            ("K/M", f"{ratio['K/M']:.5g}", "1/s^2"),
+            ("D/M", f"{ratio['D/M']:.5g}", "1/s"),
+            ("T/K", f"{scale * ratio['T/K']:.5g}", per_drive),
+        ),
         "",
         *_absolute(step),
         "",
         step.advice[0].upper() + step.advice[1:] + ".",
     ]
-    return "\n".join(line.rstrip() for line in lines)
+    return "\n".join(lines)
 
 
 def _absolute(step: StepResult) -> list[str]:
@@ -91,10 +101,10 @@ def _absolute(step: StepResult) -> list[str]:
         ]
     return [
         f"with {step.scale}",
-        *(_row(name, f"{value:.5g}", unit) for name, value, unit in known),
+        *_rows(*((name, f"{value:.5g}", unit) for name, value, unit in known)),
     ]
 
 
-def _row(name: str, value: str, unit: str, equation: str = "") -> str:
-    text = f"  {name:<17}{value:>14}  {unit}"
-    return f"{text:<52}{equation}" if equation else text
+def _rows(*rows: tuple[str, ...]) -> list[str]:
+    """Write rows of name, value, unit and, where there is one, the number of the equation."""
+    return Table(COLUMNS, [(*row, "")[:4] for row in rows]).lines(heads=False)

@@ -6,16 +6,18 @@ import math
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from .published import SI
+from ..._support.table import Column, Table
+from ..published import SI
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .published import Obtained
-    from .reproduction import Reproduction
-    from .section import Section
+    from ..published import Obtained
+    from ..reproduction import Reproduction
+    from ..section import Section
+    from ..table_2 import Table2
 
-__all__ = ["number", "place", "reading", "seen", "summary_text", "tally"]
+__all__ = ["number", "place", "reading", "seen", "summary_text", "table_2_text", "tally"]
 
 # A second harmonic has this peak to peak in units of its SD.
 PURE_ANGLE = 2.0 * math.sqrt(2.0)
@@ -57,16 +59,30 @@ def summary_text(found: Reproduction) -> str:
     return "\n".join(lines)
 
 
+def table_2_text(table: Table2) -> str:
+    """Write the contour errors of Table 2, published and obtained."""
+    lines = [
+        "contour error in um, published / obtained; max is peak to peak",
+        "radius um  frequency Hz          max               mean                SD"
+        "             max / SD",
+    ]
+    for case, run in table.cases:
+        found = run.metrics
+        pairs = (
+            (case.peak_to_peak, found.peak_to_peak),
+            (case.mean, found.mean_error),
+            (case.sd, found.sd_error),
+        )
+        cells = "  ".join(f"{1e6 * one:>7.3f} /{1e6 * other:>7.3f}" for one, other in pairs)
+        ratio = f"{case.ratio:>6.1f} /{found.peak_to_peak / found.sd_error:>5.1f}"
+        lines.append(f"{1e6 * case.radius:>9g}  {case.frequency:>12g}  {cells}  {ratio}")
+    return "\n".join(lines)
+
+
 def _columns(part: Section) -> list[str]:
     """Write a table in columns, the first left-aligned."""
-    table = [part.heads, *part.rows]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = []
-    for row in table:
-        first, *others = zip(row, widths, strict=True)
-        cells = [first[0].ljust(first[1]), *(cell.rjust(width) for cell, width in others)]
-        lines.append(("  " + "  ".join(cells)).rstrip())
-    return lines
+    first, *others = part.heads
+    return Table([Column(first, left=True), *map(Column, others)], part.rows).lines()
 
 
 def tally(found: Reproduction) -> list[str]:

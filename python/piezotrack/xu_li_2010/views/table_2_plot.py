@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._support.plot_style import (
+from ..._support.plot_style import (
     ACTUAL,
     ERROR,
     GUIDE,
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from ..control.loop.contouring import Contour
-    from .table_2 import Table2
+    from ...control.loop.contouring import Contour
+    from ..table_2 import Table2
 
 __all__ = ["plot_table_2"]
 

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from . import (
-    block_diagrams,
-    fig_03_sensor_at_rest,
-    fig_04_step_test,
-    fig_06_identification,
-    fig_07_model_comparison,
-    fig_15_circles,
-)
-from .references import RULES
+import numpy as np
+
+from ..._support.plot_style import GUIDE, MARKS, MEASURED, MODELS, heading, legend_inside, whole
+from ..._support.plot_style import panels as sheet
+from ..references import RULES
+from . import block_diagrams
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
-    from .fig_12_14_tracking import Runs
-    from .measured_log import Drives
-    from .run import Experiments
+    from ...identification.fitted.identification import Identification
+    from ..fig_12_14_tracking import Runs
+    from ..measured_log import Drives
+    from ..reproduction import Reproduction
+    from ..run import Experiments
 
-__all__ = ["Drawn", "drawn"]
+__all__ = ["Drawn", "drawn", "plot_reproduction"]
 
 
 class Drawn(NamedTuple):
@@ -42,7 +41,7 @@ def drawn(experiments: Experiments, drives: Drives | None) -> list[Drawn]:
                 "measured",
                 "A measured log: drive of our inverse and of the authors' inverse",
                 "Both less the straight line fitted to the latter, over two periods.",
-                drives.plot(),
+                _drives(drives),
             )
         ]
     return [
@@ -50,13 +49,13 @@ def drawn(experiments: Experiments, drives: Drives | None) -> list[Drawn]:
             "fig_03",
             "Fig. 3: the sensor at rest",
             "Left the first 80 ms, in steps of the sensor; right the spectrum: not white.",
-            fig_03_sensor_at_rest.draw(experiments.noise),
+            experiments.noise.plot(),
         ),
         Drawn(
             "fig_04",
             "Fig. 4: step of 75 V",
             "The readings of equations (4) to (13).",
-            fig_04_step_test.draw(experiments.step),
+            experiments.step.plot(),
         ),
         Drawn(
             "fig_05",
@@ -68,13 +67,13 @@ def drawn(experiments: Experiments, drives: Drives | None) -> list[Drawn]:
             "fig_06",
             "Fig. 6: convergence of the swarm",
             "Four parameters between the paper's bounds, on the first 4 s of Fig. 7.",
-            fig_06_identification.draw(experiments.fit),
+            _convergence(experiments.fit),
         ),
         Drawn(
             "fig_07",
             "Fig. 7: the identified models",
             "0.25 Hz, 0 to 75 V; the part to the right of the dotted line was not fitted.",
-            fig_07_model_comparison.draw(experiments.judged),
+            experiments.judged.plot(),
         ),
         Drawn(
             "fig_12",
@@ -106,7 +105,7 @@ def drawn(experiments: Experiments, drives: Drives | None) -> list[Drawn]:
             "table_2",
             "Fig. 15a and Table 2: circles of 10, 20 and 40 um",
             "Bars: published and obtained.",
-            fig_15_circles.draw(experiments.table),
+            experiments.table.plot(),
         ),
         *measured,
     ]
@@ -123,9 +122,6 @@ FOURTEEN = {"without": "feedforward and PID", "with": "with repetitive control"}
 
 def _grid(runs: Runs, names: dict[str, str], columns: tuple[str, ...]) -> Figure:
     """Draw each run in a row."""
-    from .._support.plot_style import legend_inside, whole
-    from .._support.plot_style import panels as sheet
-
     figure = sheet(None, (12.0, 3.3 * len(names)))
     rows = figure.subfigures(len(names), 1, squeeze=False)[:, 0]
     for (key, title), row in zip(names.items(), rows, strict=True):
@@ -138,4 +134,70 @@ def _grid(runs: Runs, names: dict[str, str], columns: tuple[str, ...]) -> Figure
                 reach = 1.25e6 * run.metrics.max_error
                 ax.set_ylim(-reach, reach)
                 legend_inside(ax, ncols=2)
+    return whole(figure)
+
+
+def _convergence(fit: Identification) -> Figure:
+    """Draw the convergence of the swarm."""
+    figure = sheet(None, (11.0, 4.2))
+    fit.plot_convergence(ax=figure.add_subplot())
+    return whole(figure)
+
+
+def _drives(drives: Drives) -> Figure:
+    """Draw the drives over the reference and, less the line, over time."""
+    figure = sheet(None, (11.0, 4.6))
+    left, right = figure.subplots(1, 2)
+    # Two periods of 1 Hz.
+    part = drives.t < drives.t[0] + 2.0
+    t, um = drives.t[part], 1e6 * (drives.desired - drives.desired.mean())[part]
+    left.plot(um, (drives.measured - drives.line)[part], **MEASURED)
+    right.plot(t, (drives.measured - drives.line)[part], **MEASURED)
+    for (name, voltage), line in zip(drives.computed.items(), MODELS, strict=False):
+        added = (voltage - drives.line)[part]
+        left.plot(um, added, linewidth=1.1, label=name, **line)
+        right.plot(t, added, linewidth=1.1, label=name, **line)
+    left.set(xlabel="reference [um]", ylabel="drive - straight line [V]")
+    right.set(xlabel="time [s]", ylabel="drive - straight line [V]")
+    right.margins(x=0.0)
+    legend_inside(right, ncols=2)
+    return whole(figure)
+
+
+def plot_reproduction(found: Reproduction, fig: Figure | SubFigure | None = None) -> Figure:
+    """Draw obtained over published of every number, with quartiles, in the order of the paper.
+
+    Parameters
+    ----------
+    found : Reproduction
+        The numbers.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Where to draw; a new figure where not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure drawn in.
+    """
+    rows = found.obtained
+    figure = sheet(fig, (11.0, 5.0))
+    ax = figure.subplots()
+    ratios = np.array([row.ratio for row in rows])
+    quartiles = np.array([row.quartiles for row in rows]).T
+    published = np.array([row.observable.published for row in rows])
+    reach = np.sort(quartiles / published, axis=0)
+    places = np.arange(len(rows))
+    ax.axhline(1.0, **GUIDE)
+    ax.vlines(places, *reach, color=MEASURED["color"])
+    reached = np.array([row.reached for row in rows])
+    ax.plot(places[reached], ratios[reached], **{**MARKS, "markersize": 3.0, "label": "reached"})
+    missed = {**MARKS, "markersize": 5.0, "marker": "x", "label": "not reached"}
+    ax.plot(places[~reached], ratios[~reached], **missed)
+    figures = [row.observable.figure for row in rows]
+    first = [i for i, name in enumerate(figures) if i == 0 or name != figures[i - 1]]
+    ax.set_xticks(first, [figures[i] for i in first], rotation=90, fontsize="small")
+    ax.set(xlabel="figure or table of the paper", ylabel="obtained / published")
+    ax.margins(x=0.01)
+    heading(ax, f"Median and quartiles of {len(found.seeds)} seeds")
+    legend_inside(ax)
     return whole(figure)

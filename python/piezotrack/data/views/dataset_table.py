@@ -1,32 +1,19 @@
-"""A record in one line, and as a table of a notebook."""
+"""Table of a record, as a notebook shows it."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..._support.html_table import html_table
+from ..._support.table import words
 from ..._support.units import best_length_unit
 
 if TYPE_CHECKING:
     from ..dataset import Dataset
 
-__all__ = ["as_line", "as_table"]
+__all__ = ["dataset_html"]
 
 
-def as_line(data: Dataset) -> str:
-    """Write a record in one line."""
-    unit, scale = best_length_unit(data.stroke)
-    parts = [
-        f"{len(data)} samples",
-        f"{data.duration:.6g} s at {1.0 / data.dt:.6g} Hz",
-        f"stroke {data.stroke * scale:.3g} {unit}",
-    ]
-    if data.warmup:
-        parts.append(f"warm-up {data.warmup} samples")
-    return f"Dataset({', '.join(parts)})"
-
-
-def as_table(data: Dataset) -> str:
+def dataset_html(data: Dataset) -> str:
     """Write a record as a table in HTML."""
     unit, scale = best_length_unit(data.stroke)
     low, high = scale * data.y.min(), scale * data.y.max()
@@ -40,4 +27,4 @@ def as_table(data: Dataset) -> str:
     ]
     rows += [(name, data.column_units.get(name, "")) for name in data.columns]
     rows += [("note", note) for note in data.notes]
-    return html_table(f"Dataset {data.source or ''}".rstrip(), rows)
+    return words(f"Dataset {data.source or ''}".rstrip(), rows).html()

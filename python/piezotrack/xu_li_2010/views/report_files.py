@@ -6,8 +6,9 @@ from itertools import pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from .._support.files import make_folder, replacing, together, write_document
-from .._support.plot_style import without_glyph_warnings
+from ..._support.files import make_folder, replacing, together, write_document
+from ..._support.plot_style import without_glyph_warnings
+from ..reproduction import REPORT
 from .figures import Drawn, drawn
 from .report_html import html_text
 from .report_text import summary_text
@@ -17,12 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from .reproduction import Reproduction
+    from ..reproduction import Reproduction
 
-__all__ = ["REPORT", "pages", "save_report"]
-
-# The files.
-REPORT = ("report.html", "report.pdf", "report.json")
+__all__ = ["pages", "save_report"]
 
 # Lines on a page, and their size in points.
 LINES, TYPE = 66, 7.0

@@ -7,16 +7,16 @@ from html import escape
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-from .apparatus import calibration_file
-from .published import observables
-from .references import RULES
+from ..apparatus import calibration_file
+from ..published import observables
+from ..references import RULES
 from .report_text import number, place, reading, seen, tally
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    from ..reproduction import Reproduction
     from .figures import Drawn
-    from .reproduction import Reproduction
 
 __all__ = ["html_text", "svg_text"]
 

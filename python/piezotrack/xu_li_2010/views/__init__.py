@@ -1,0 +1,1 @@
+"""Report of the reproduction: tables, figures, pages."""
