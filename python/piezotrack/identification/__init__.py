@@ -1,7 +1,7 @@
 """From a record to a model.
 
 Swarm search, least squares, step response, sensor noise, cross-talk, the comparison of models and
-the model files; tables and pictures stand beside their results.
+the model files; tables and pictures of the results are in `views`.
 """
 
 from __future__ import annotations
