@@ -12,46 +12,45 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["Result"]
+__all__ = ["Result", "Viewed"]
 
 
-class Result:
-    """Result of a computation: its text, its picture, and its content as plain data.
+class Viewed:
+    """Data with a picture.
 
     The functions that write and draw it are listed in `views` by name, and are imported when they
-    are used: pictures import results, results import no picture. ``document`` and ``save`` are of
-    the class itself.
+    are used: pictures import what they draw, and that imports no picture.
 
     Attributes
     ----------
     views : mapping of str to str
-        ``module:function`` below ``piezotrack`` for ``summary`` and ``plot``, for ``html`` where a
-        notebook shows more than the text, and for the panels of the class.
+        ``module:function`` below ``piezotrack`` for ``plot``, for ``html`` as a notebook shows it,
+        and for the panels of the class.
     """
 
     views: ClassVar[Mapping[str, str]]
 
     @classmethod
     def view(cls, name: str) -> Callable[..., Any]:
-        """Import a function of `views`, whose first argument is the result."""
+        """Import a function of `views`.
+
+        Parameters
+        ----------
+        name : str
+            Its name there.
+
+        Returns
+        -------
+        callable
+            Its first argument is the object.
+        """
         module, _, function = cls.views[name].partition(":")
         imported = import_module(f"piezotrack.{module}")
         view: Callable[..., Any] = getattr(imported, function)
         return view
 
-    def summary(self) -> str:
-        """Write the result as text.
-
-        Returns
-        -------
-        str
-            Several lines, which ``print(result)`` shows too.
-        """
-        text: str = self.view("summary")(self)
-        return text
-
     def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Draw the result.
+        """Draw it.
 
         Parameters
         ----------
@@ -71,11 +70,37 @@ class Result:
         axes: Axes = self.view(name)(self, ax, **options)
         return axes
 
+    def _repr_html_(self) -> str:
+        table: str = self.view("html")(self)
+        return table
+
+
+class Result(Viewed):
+    """Result of a computation: its text, its picture, and its content as plain data.
+
+    ``document`` and ``save`` are of the class itself.
+
+    Attributes
+    ----------
+    views : mapping of str to str
+        As of `Viewed`, with ``summary``; without ``html`` a notebook shows the text.
+    """
+
+    def summary(self) -> str:
+        """Write the result as text.
+
+        Returns
+        -------
+        str
+            Several lines, which ``print(result)`` shows too.
+        """
+        text: str = self.view("summary")(self)
+        return text
+
     def __str__(self) -> str:
         return self.summary()
 
     def _repr_html_(self) -> str:
-        if "html" not in self.views:
-            return f"<pre>{escape(self.summary())}</pre>"
-        table: str = self.view("html")(self)
-        return table
+        if "html" in self.views:
+            return super()._repr_html_()
+        return f"<pre>{escape(self.summary())}</pre>"

@@ -150,15 +150,15 @@ class ControllerComparison(Result):
     rows : tuple of Row
         The controllers.
     references, variants : tuple of str
-        What was followed, and on which stages.
+        Names of the references, and of the stages.
     refused : mapping of str to str
         Controllers that could not be made, and why.
     dt : float
         Sampling interval [s].
     margins : Margins
-        What every feedback keeps.
+        Margins that every feedback keeps.
     seeds : int
-        Draws of the sensor's noise that each controller was judged by.
+        Draws of the sensor's noise with which each controller was evaluated.
     """
 
     views: ClassVar[Mapping[str, str]] = {

@@ -56,7 +56,7 @@ class Entry(NamedTuple):
     controller : Controller
         With its feedforward.
     reference : Reference
-        What it follows: that asked for, or one with more periods.
+        Reference to follow: the given one, or one with more periods.
     voltage : ndarray or None
         Feedforward in place of that of the controller [V].
     """
@@ -68,7 +68,7 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What all controllers are made for.
+    """Task of all controllers of a comparison.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Task:
     record : Dataset or None
         To train a network with.
     references : list of Reference
-        What is followed.
+        References to follow.
     dt : float
         Sampling interval [s].
     limits : (float, float)

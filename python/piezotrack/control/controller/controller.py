@@ -186,7 +186,7 @@ class Controller:
         Parameters
         ----------
         model : IdentifiedModel
-            What ``pt.identify`` or ``pt.load`` returns.
+            Identified model, from ``pt.identify`` or ``pt.load``.
         dt : float, optional
             Sampling interval [s]; default that of the record identified.
         limits : (float, float), optional
@@ -364,8 +364,8 @@ class Controller:
         path : path-like
             The file.
         report : LoopReport, TuningReport or Tuned, optional
-            What `check_loop` or `tune` has returned for this controller. Without one the margins
-            of the file that the controller was read from are kept.
+            Margins of this controller, from `check_loop` or `tune`. Without a report the margins of
+            the file that the controller was read from are kept.
 
         Returns
         -------

@@ -77,7 +77,7 @@ class IterativeLearning:
     Parameters
     ----------
     model : Stage, VirtualStage or IdentifiedModel
-        What L is made of, linearised at its middle gain.
+        Model that L is made of, linearised at its middle gain.
     reference : Reference
         The reference.
     controller : Controller
@@ -256,7 +256,7 @@ class IterativeLearning:
 
     @property
     def convergence(self) -> Convergence:
-        """What a trial leaves of the distance to the final table, on each of the models."""
+        """Share of the distance to the final table that remains after a trial, by model."""
         return self._rule.convergence
 
     @property

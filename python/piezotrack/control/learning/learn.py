@@ -99,7 +99,7 @@ class Learning(Result):
 
     @property
     def convergence(self) -> Convergence:
-        """What a trial leaves of the distance to the final table, on each of the models."""
+        """Share of the distance to the final table that remains after a trial, by model."""
         return self.learner.convergence
 
     def document(self) -> dict[str, Any]:

@@ -35,7 +35,7 @@ LEFT = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class LearningPlant:
-    """What learning acts on: from the learnt voltage to the displacement, the loop closed.
+    """Plant of the learning: from the learnt voltage to the displacement, the loop closed.
 
     Attributes
     ----------

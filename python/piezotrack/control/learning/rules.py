@@ -41,7 +41,7 @@ HIGHEST_CHOSEN = 0.25
 
 @dataclass(frozen=True, kw_only=True)
 class Convergence:
-    """What remains, after a trial, of the distance to the table that learning ends at.
+    """Share of the distance to the final table that remains after a trial.
 
     Attributes
     ----------
@@ -138,7 +138,7 @@ class FrequencyRule:
         Parameters
         ----------
         learnt : ndarray, shape (n,)
-            What the last trial had above the feedforward [V].
+            Voltage of the last trial above the feedforward [V].
         error : ndarray, shape (n,)
             Desired less measured displacement [m].
 
@@ -255,7 +255,7 @@ class LiftedRule:
         Parameters
         ----------
         learnt : ndarray, shape (n,)
-            What the last trial had above the feedforward [V].
+            Voltage of the last trial above the feedforward [V].
         error : ndarray, shape (n,)
             Desired less measured displacement [m].
 

@@ -38,7 +38,7 @@ class Trials(ABC):
     Attributes
     ----------
     learner : IterativeLearning
-        What learns.
+        The learning control.
     settle, repeats : int
         Periods before the recorded ones, and recorded periods or runs.
     """

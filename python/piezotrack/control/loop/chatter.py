@@ -46,7 +46,7 @@ def chatter(run: Tracking, *, after: float = 0.0) -> Chatter:
     Parameters
     ----------
     run : Tracking
-        What ``pt.track`` returns.
+        Tracked motion.
     after : float, optional
         Time from which it counts [s], as the loop has to settle first.
 

@@ -416,7 +416,7 @@ def contour(
 
 
 class Workspace(NamedTuple):
-    """What an XY stage reaches.
+    """Reach of an XY stage.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
-"""What a closed-loop run is refused for, before it is simulated.
+"""Preconditions of a closed-loop run, checked before it is simulated.
 
-A drive in another unit than the controller's, a repetitive part of another period, an unstable
-loop, and a reference beyond the stage's reach.
+The drive has the unit of the controller, a repetitive part the period of the reference, the loop is
+stable, and the reference is within the reach of the stage.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ class LoopCheck:
         Roots at exactly 1 that are not observable in the error: uRC and uFB drift against each
         other.
     hint : str or None
-        What may be wrong with the gain.
+        Probable mistake in the gain.
     drive_unit : str
         Unit of the drive, for what is printed.
     """

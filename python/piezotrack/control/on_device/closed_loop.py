@@ -47,7 +47,7 @@ class DeviceTracking(Tracking):
     Attributes
     ----------
     latency : Latency
-        What was measured before the loop began.
+        Latency measured before the loop began.
     lateness : ndarray, shape (n,)
         Time from each tick until its voltage was out [s]; NaN where the tick was left out.
     """

@@ -1,4 +1,4 @@
-"""What a loop on a device watches its readings and its clock for."""
+"""Guard of a loop on a device: its readings and its clock are watched for faults."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def plot_learning(found: Learning, fig: Figure | SubFigure | None = None) -> Fig
     Parameters
     ----------
     found : Learning
-        What was learnt.
+        The learning.
     fig : matplotlib.figure.Figure or SubFigure, optional
         Where to draw; a new figure where not given.
 

@@ -162,7 +162,7 @@ def plot_feedforward(
     fig : matplotlib.figure.Figure or SubFigure, optional
         Figure to draw in; default a new one.
     title : str, optional
-        What ran.
+        Title of the picture.
     drive_unit : str, optional
         Unit of the drive, SI.
 
