@@ -167,7 +167,7 @@ def measured() -> Problem:
     """The Dahl model on a measured log, with all parameters that the log shows."""
     log = pt.datasets.dbo_training()[3.0:23.0]
     short = pt.ParticleSwarm(particles=2, iterations=1, polish=False)
-    fit = pt.identify(log, "dahl", history="virgin", swarm=short, runs=1)
+    fit = pt.identify(log, "dahl", history="virgin", method=replace(short, runs=1))
     # piezotrack holds the stiffness, which is the scale, and a mass too small to matter.
     found = {name: fit.parameters[name] for name in NAMES}
     return Problem(

@@ -128,7 +128,12 @@ def identify(problem: Problem, own: Own, seed: int, threads: int) -> tuple[Row, 
 
     arguments = {**problem.arguments, **own.arguments}
     fit = pt.identify(
-        problem.log, seed=seed, threads=threads, progress=False, callback=follow, **arguments
+        problem.log,
+        method=pt.Descents(seed=seed),
+        threads=threads,
+        progress=False,
+        callback=follow,
+        **arguments,
     )
     seconds = time.perf_counter() - began
     simulations = fit.nfev + fit.npolish

@@ -84,7 +84,7 @@ def two_tones() -> pt.Dataset:
 
 def run_costs(log: pt.Dataset, swarm: pt.ParticleSwarm, **arguments: object) -> np.ndarray:
     """Cost of each run [um]."""
-    fit = pt.identify(log, swarm=swarm, runs=RUNS, **arguments)
+    fit = pt.identify(log, method=replace(swarm, runs=RUNS), **arguments)
     return 1e6 * np.array([run.cost for run in fit.runs])
 
 

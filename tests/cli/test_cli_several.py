@@ -42,12 +42,11 @@ def test_several_logs_give_one_model() -> None:
     fit = pt.identify(
         [pt.read("a.csv")[0.0:3.0], pt.read("b.csv")[0.4:]],
         "dahl",
-        stiffness=26065.0,
-        fixed=HELD,
+        parameters={**HELD, "stiffness": 26065.0},
         history="virgin",
         delay=[0.0, True],
         weights=[1.0, 2.0],
-        seed=1,
+        method=pt.Descents(seed=1),
     )
     read = pt.load("results/dahl.json")
     assert read.model == fit.model

@@ -105,7 +105,10 @@ def models() -> list[str]:
     small = pt.ParticleSwarm(particles=8, iterations=4)
     kinds = ("dahl", "bouc-wen", "first-order-dahl", "parallel-dahl", "bouc-wen-oscillator")
     fits = [
-        *(pt.identify(data, k, swarm=small, runs=1, threads=1, delay=k == "dahl") for k in kinds),
+        *(
+            pt.identify(data, k, method=replace(small, runs=1), threads=1, delay=k == "dahl")
+            for k in kinds
+        ),
         *(pt.identify(data, k) for k in ("prandtl-ishlinskii", "generalised-prandtl-ishlinskii")),
     ]
     older = sorted((Path(__file__).parents[1] / "files").glob("*.json"))

@@ -52,7 +52,7 @@ def test_every_record_model_and_seed_is_identified_as_by_hand(tmp_path: Path) ->
     for one in found:
         record = log() if one.record == "stage 1.csv" else log(0.9)
         own = QUICK if one.model == "quick" else {"model": PLAYS}
-        fit = pt.identify(record, seed=one.seed, **own)
+        fit = pt.identify(record, method=pt.Descents(seed=one.seed), **own)
         loaded = pt.load(one.file)
         assert loaded.model == one.fit.model == fit.model
         assert (loaded.offset, one.rms, one.notes) == (fit.offset, fit.cost, fit.notes)

@@ -44,12 +44,11 @@ def found(
     return pt.identify(
         record(offset=3e-6 if offset else 0.0),
         "first-order-dahl",
-        fixed=HELD,
+        parameters=HELD,
         creep=creep,
         offset=offset,
         delay=delay,
-        runs=1,
-        swarm=pt.ParticleSwarm(iterations=20, particles=16),
+        method=pt.ParticleSwarm(iterations=20, particles=16, runs=1),
     )
 
 
@@ -96,10 +95,7 @@ def test_the_weights_are_those_of_linear_least_squares() -> None:
 def test_the_weights_stay_below_a_half() -> None:
     # All of the motion is delayed: what no creep is.
     slow = replace(STAGE, creep_weights=(2.0,), creep_times=(1.0,))
-    fit = pt.identify(
-        record(slow), "first-order-dahl", fixed=HELD, creep=[0.5, 1.0], runs=1,
-        swarm=pt.ParticleSwarm(iterations=20, particles=16),
-    )  # fmt: skip
+    fit = pt.identify(record(slow), "first-order-dahl", parameters=HELD, creep=[0.5, 1.0], method=pt.ParticleSwarm(iterations=20, particles=16, runs=1))  # fmt: skip
     assert min(fit.model.creep_weights) >= 0.0
     assert sum(fit.model.creep_weights) == pytest.approx(0.5, abs=1e-9)
 
@@ -131,7 +127,7 @@ def two_records(noise: float = 0.0) -> list[pt.Dataset]:
 
 def together(records: list[pt.Dataset], **asked: Any) -> pt.identification.Identification:
     asked = {"creep": (0.3, 4.0), "history": "virgin", "progress": False, **asked}
-    return pt.identify(records, "first-order-dahl", fixed=HELD, **asked)
+    return pt.identify(records, "first-order-dahl", parameters=HELD, **asked)
 
 
 @pytest.mark.parametrize("method", ["descents", "swarm"])
@@ -186,7 +182,7 @@ def test_the_search_of_several_records_ends_at_a_minimum() -> None:
         for change in (0.98, 1.02):
             held = {**HELD, name: change * value}
             beside = pt.identify(
-                records, "first-order-dahl", fixed=held, creep=(0.3, 4.0), history="virgin"
+                records, "first-order-dahl", parameters=held, creep=(0.3, 4.0), history="virgin"
             )
             assert beside.cost > fit.cost
 
@@ -243,7 +239,7 @@ def test_of_models_found_by_least_squares_it_is_a_setting() -> None:
     with pytest.raises(pt.ParameterError, match="creep is True: expected none with the model"):
         pt.identify(record(), "prandtl-ishlinskii", creep=True)
     with pytest.raises(pt.ParameterError, match="fixed is 'creep_weights': expected one of mass"):
-        pt.identify(record(), "first-order-dahl", fixed={"creep_weights": 0.1})
+        pt.identify(record(), "first-order-dahl", parameters={"creep_weights": 0.1})
 
 
 def test_a_model_file_keeps_it_and_older_ones_have_none(tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_the_cost_is_that_of_linear_least_squares(creep: Any) -> None:
     stage = replace(STAGE, creep_weights=(0.02, 0.03), creep_times=(0.4, 6.0)) if creep else STAGE
     data = record(drift=(6e-7, 12.0), stage=stage)
     asked = pt.identification.Objective(
-        data, "dahl", fixed=HELD, drift=True, history="virgin", creep=creep
+        data, "dahl", parameters=HELD, drift=True, history="virgin", creep=creep
     )
     assert list(asked.ranges)[-1] == "drift_time"
     draws, count = np.random.default_rng(5), len(asked.ranges)

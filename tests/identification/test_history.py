@@ -33,7 +33,7 @@ def record(visited: list[float], seed: int = 0, amplitude: float = 35.0) -> pt.D
 
 def fitted(log: pt.Dataset, **settings: Any) -> pt.identification.Identification:
     return pt.identify(
-        log, "first-order-dahl", swarm=QUICK, runs=2, seed=1, progress=False, **settings
+        log, "first-order-dahl", method=replace(QUICK, seed=1, runs=2), progress=False, **settings
     )
 
 

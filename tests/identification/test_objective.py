@@ -27,7 +27,7 @@ def log() -> pt.Dataset:
 
 
 def objective(**asked: Any) -> pt.identification.Objective:
-    return pt.identification.Objective(log(), "dahl", fixed=HELD, **asked)
+    return pt.identification.Objective(log(), "dahl", parameters=HELD, **asked)
 
 
 def places(count: int, cost: pt.identification.Objective) -> NDArray[np.float64]:
@@ -105,7 +105,7 @@ def test_ctrl_c_is_raised_and_no_costs_are_made_up() -> None:
     """So many costs take ten seconds."""
     once = log()
     u, y = np.tile(once.u, 20), np.tile(once.y, 20)
-    cost = pt.identification.Objective(pt.Dataset(u=u, y=y, dt=once.dt), "dahl", fixed=HELD)
+    cost = pt.identification.Objective(pt.Dataset(u=u, y=y, dt=once.dt), "dahl", parameters=HELD)
     many = places(200_000, cost)
     threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):

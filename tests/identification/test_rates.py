@@ -33,7 +33,11 @@ def test_plays_fitted_at_1_hz_hold_at_others() -> None:
 
 def test_the_least_lag_is_taken_and_the_range_is_told() -> None:
     fit = pt.identify(
-        SLOW, "first-order-dahl", swarm=QUICK, runs=2, seed=1, progress=False, history="virgin"
+        SLOW,
+        "first-order-dahl",
+        method=replace(QUICK, seed=1, runs=2),
+        progress=False,
+        history="virgin",
     )
     assert fit.lags is not None
     assert fit.model.damping / fit.model.stiffness == pytest.approx(fit.lags.least, rel=1e-9)
@@ -48,7 +52,9 @@ def test_the_least_lag_is_taken_and_the_range_is_told() -> None:
 
 
 def test_a_loop_that_is_damping_is_told() -> None:
-    fit = pt.identify(SLOW, "dahl", swarm=QUICK, runs=2, seed=1, progress=False, history="virgin")
+    fit = pt.identify(
+        SLOW, "dahl", method=replace(QUICK, seed=1, runs=2), progress=False, history="virgin"
+    )
     assert any("holds at this rate only" in note for note in fit.notes)
 
 
@@ -57,9 +63,7 @@ def test_a_mass_that_is_asked_for_is_searched() -> None:
     fit = pt.identify(
         SLOW,
         "first-order-dahl",
-        free=names,
-        swarm=pt.ParticleSwarm(iterations=2, polish=False),
-        runs=1,
+        method=pt.ParticleSwarm(iterations=2, polish=False, runs=1),
         progress=False,
         history="virgin",
     )

@@ -39,7 +39,7 @@ class StopError(Exception):
 
 def search(callback: Callable[[Any], object] | None = None) -> None:
     with suppress(StopError, pt.Interrupted):
-        pt.identify(DATA, "dahl", swarm=SMALL, runs=1, callback=callback)
+        pt.identify(DATA, "dahl", method=replace(SMALL, runs=1), callback=callback)
 
 
 def raising(_: Any) -> None:

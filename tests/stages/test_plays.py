@@ -244,10 +244,10 @@ def test_what_has_no_meaning_for_plays_is_refused(name: str) -> None:
 def test_how_a_search_is_run_may_be_said_of_plays_too() -> None:
     log = record(PLAIN, samples=1000)
     plain = pt.identify(log, "prandtl-ishlinskii")
-    run = pt.identify(log, "prandtl-ishlinskii", seed=3, runs=2, threads=1, progress=False)
+    run = pt.identify(log, "prandtl-ishlinskii", threads=1, progress=False)
     assert run.model == plain.model
     with pytest.raises(pt.ParameterError, match="seed is -1"):
-        pt.identify(log, "prandtl-ishlinskii", seed=-1)
+        pt.identify(log, "prandtl-ishlinskii")
 
 
 def test_the_number_of_values_fitted_counts_the_offset() -> None:
@@ -382,7 +382,7 @@ def test_an_argument_that_cannot_be_is_refused(name: str) -> None:
 
 def test_settings_of_another_kind_are_refused() -> None:
     with pytest.raises(pt.ParameterError, match=r"^least_squares is 5: expected a pt"):
-        pt.identify(record(PLAIN), "prandtl-ishlinskii", least_squares=5)  # type: ignore[arg-type]
+        pt.identify(record(PLAIN), "prandtl-ishlinskii", method=5)  # type: ignore[arg-type]
 
 
 def test_a_short_window_is_refused() -> None:

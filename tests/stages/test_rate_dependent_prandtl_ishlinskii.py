@@ -127,9 +127,7 @@ def test_records_at_three_rates_determine_it() -> None:
     # Without rate dependence the three contradict each other, with a lag too.
     plain = pt.identify(logs, "prandtl-ishlinskii", **asked)  # type: ignore[arg-type]
     late = replace(settings, dynamics="first")
-    lagging = pt.identify(
-        logs, "prandtl-ishlinskii", history="virgin", drift=False, least_squares=late
-    )
+    lagging = pt.identify(logs, "prandtl-ishlinskii", history="virgin", drift=False, method=late)
     assert plain.cost > lagging.cost > 10.0 * fit.cost
     # And foretells a rate that it was not fitted to.
     other = record(4.0, 7)

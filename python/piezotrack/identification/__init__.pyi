@@ -33,11 +33,13 @@ from .fitted.identified_model import load as load
 from .fitted.score import Score as Score
 from .fitted.start import Start as Start
 from .methods.descents import Descents as Descents
+from .methods.least_squares import LeastSquares as LeastSquares
 from .methods.particle_swarm import ParticleSwarm as ParticleSwarm
 from .problem.objective import Objective as Objective
-from .solve.likely_models import likely_models as likely_models
+from .problem.parameter import Parameter as Parameter
+from .problem.records import Record as Record
+from .solve.posterior_models import posterior_models as posterior_models
 from .solve.selection import Trial as Trial
-from .solve.weights import LeastSquares as LeastSquares
 from .views.plot import plot_convergence as plot_convergence
 from .views.plot import plot_loop as plot_loop
 from .views.plot import plot_time as plot_time

@@ -10,6 +10,7 @@ from ..control.controller.controller import Controller
 from ..control.laws.components import Pid, Repetitive
 from ..control.loop.tracking import Tracking, track
 from ..identification.fit import identify
+from ..identification.methods.descents import Descents
 from ..references.waveforms import sine
 from ..stages.dahl import DahlStage
 from ..stages.virtual import VirtualStage
@@ -73,9 +74,13 @@ def identify_demo(
     return identify(
         log[:FITTED_SECONDS],
         "dahl",
-        fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
-        bounds=SEARCH_BOX,
-        seed=seed,
+        parameters={
+            **SEARCH_BOX,
+            "a1": published.a1,
+            "a2": published.a2,
+            "b1": published.b1,
+        },
+        method=Descents(seed=seed),
         progress=progress,
         callback=callback,
     )

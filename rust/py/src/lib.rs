@@ -15,7 +15,7 @@ mod least_squares;
 mod models;
 mod numbers;
 mod objective;
-mod question;
+mod problem;
 mod snapshots;
 mod stage;
 mod step;

@@ -10,8 +10,6 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import positive
 from ..._support.json_text import object_of
-from ..._support.messages import quoted
-from ...errors import ParameterError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -20,7 +18,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Drift", "asked_drift", "drift_entry", "drift_of", "drift_of_asked"]
+__all__ = ["Drift", "drift_entry", "drift_of"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,62 +137,6 @@ class Drift:
         size = float(shape @ shape)
         found: Array = fading * (float(shape @ rest) / size if size > 0.0 else 0.0)
         return found
-
-
-def asked_drift(drift: object) -> float | None:
-    """Check what is asked of the drift of a record.
-
-    Parameters
-    ----------
-    drift : object
-        Argument of the caller: True or ``"auto"`` for what the record shows, False for none, or
-        a time constant [s].
-
-    Returns
-    -------
-    float or None
-        The time constant [s]; 0 for none, None for what the record shows.
-
-    Raises
-    ------
-    ParameterError
-        It is none of these.
-    """
-    if isinstance(drift, (bool, np.bool_)):
-        return None if drift else 0.0
-    if drift is None or (isinstance(drift, str) and drift == "auto"):
-        return None
-    return positive("drift", drift, "s")
-
-
-def drift_of_asked(drift: object, *, offset: bool, searched: bool) -> float | None:
-    """Time constant of the drift of a record, as the core takes it.
-
-    Parameters
-    ----------
-    drift : object
-        As for `asked_drift`.
-    offset : bool
-        Whether an offset of the record is fitted.
-    searched : bool
-        Whether the model is searched: such a one has no drift where nobody asks for it.
-
-    Returns
-    -------
-    float or None
-        As for `asked_drift`.
-
-    Raises
-    ------
-    ParameterError
-        The drift is none of what `identify` takes, or is asked for without an offset.
-    """
-    time = asked_drift(drift)
-    if drift is None and (searched or not offset):
-        return 0.0
-    if not offset and time != 0.0:
-        raise ParameterError(f"drift is {quoted(drift)}: expected none with offset=False")
-    return time
 
 
 def drift_entry(drift: Drift | None) -> dict[str, Any]:

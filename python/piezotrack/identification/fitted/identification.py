@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from ...data.dataset import Dataset
     from ...stages.base import Response
     from ..methods.descents import Descents
+    from ..methods.least_squares import LeastSquares
     from ..methods.particle_swarm import ParticleSwarm
     from ..solve.selection import Trial
-    from ..solve.weights import LeastSquares
     from .estimates import Constraint, Estimate, LagRange, StopReason, SwarmRun
     from .score import Score
 

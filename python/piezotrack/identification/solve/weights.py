@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.arguments import as_numbers
 from ..._support.messages import quoted
 from ...errors import DataError, ParameterError
 from ...stages.registry import stage_class
-from ..fitted.drift import Drift, asked_drift, drift_of_asked
+from ..fitted.drift import Drift
 from ..fitted.estimates import LagRange
 from ..fitted.fitted_record import FittedRecord
 from ..fitted.identification import Identification
 from ..fitted.model_file import fit_entry, origin_of, provenance
 from ..fitted.notes import spread_of
 from ..fitted.start import start_of_fit
-from ..problem.problem import delay_bounds
-from ..problem.records import of_record
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from ...data.dataset import Dataset
     from ...stages.model_info import ModelInfo
-    from ..problem.records import Asked
+    from ..methods.least_squares import LeastSquares
+    from ..problem.problem import Problem
+    from ..problem.records import Record
 
-__all__ = ["LeastSquares", "solve_least_squares"]
+__all__ = ["solve_least_squares"]
 
-MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS = 32, 8, 8
+MOST_RELAXATIONS = 8
 DYNAMICS = ("time_constant", "frequency", "damping_ratio")
 # Parameters that the settings and the record fix beforehand.
 CHOSEN = (
@@ -45,142 +43,15 @@ CHOSEN = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class LeastSquares:
-    """Settings of an identification by least squares.
-
-    The weights of plays, dead zones and creep and the offset are found by the Gauss-Newton method,
-    each step of which is a non-negative least-squares problem (Lawson and Hanson 1974); without
-    dead zones and creep a single step solves the problem, as in Kuhnen 2003, doi
-    10.3166/ejc.9.407-418. Weights of dead zones stay between -0.5 and 1, the creep below half of
-    the displacement. The frequency and damping of a mode start from a grid and are found along
-    with the weights. By default plays, creep and dynamics are those that the record shows; each
-    has to lower the deviation by 1.5 to 3 % to be taken. Nothing is random.
-
-    Parameters
-    ----------
-    count : int, optional
-        Number of plays, 1 to 32, with thresholds spread evenly up to half of the drive's range.
-        None: 20, or 10 with fewer than 800 samples; others where they foretell a third of the
-        window better that was left out: up to 32, or fewer about which the weights of these gather.
-        Of a model with levels the number of intervals between them, 1 to 16; None: 6, or 12.
-    thresholds : sequence of float, optional
-        Thresholds of the plays [V], in place of `count`.
-    levels : sequence of float, optional
-        Levels [V] of a model that has them, in place of `count`.
-    dead_zones : bool or int, optional
-        Number of one-sided dead zones, 0 to 8, spread evenly over the displacement; True stands
-        for 2, or for none where the model has no dead zones.
-    creep : {"auto"} or bool or sequence of float, optional
-        Time constants of the creep [s]; True stands for the powers of ten between five samples
-        and half of the window. ``"auto"``: two a decade apart, where the record shows them.
-    dynamics : {"auto", "first", "second"} or None, optional
-        ``"first"``: a first-order lag, which also approximates a delayed reading. ``"second"``: a
-        mode, of at least three cycles in the window and at most 0.45 cycles a sample. None:
-        neither. ``"auto"``: a mode where the record shows one, else the smallest lag that
-        explains it within 1 %, which may be none.
-
-    Raises
-    ------
-    ParameterError
-        A setting is out of its range.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import piezotrack as pt
-    >>> stage = pt.PrandtlIshlinskiiStage(
-    ...     linear=1e-6, thresholds=[10.0, 20.0], weights=[0.2e-6, 0.1e-6]
-    ... )
-    >>> u = 37.5 * (1 - np.cos(np.arange(2000) / 100.0))
-    >>> log = pt.Dataset(u=u, y=stage.simulate(u, 0.01).x, dt=0.01)
-    >>> settings = pt.identification.LeastSquares(
-    ...     thresholds=[5.0, 10.0, 20.0], dead_zones=False, dynamics=None
-    ... )
-    >>> fit = pt.identify(log, "prandtl-ishlinskii", least_squares=settings)
-    >>> print(", ".join(f"{1e6 * weight:.3f}" for weight in fit.model.weights), "um/V")
-    0.000, 0.200, 0.100 um/V
-    """
-
-    count: int | None = None
-    thresholds: Sequence[float] | None = None
-    levels: Sequence[float] | None = None
-    dead_zones: bool | int = True
-    creep: Literal["auto"] | bool | Sequence[float] = "auto"
-    dynamics: Literal["auto", "first", "second"] | None = "auto"
-
-    def __post_init__(self) -> None:
-        if self.count is not None:
-            count = _core.as_count("count", self.count)
-            if not 1 <= count <= MOST_PLAYS:
-                raise ParameterError(f"count is {count}: expected 1 to {MOST_PLAYS} plays")
-        if self.thresholds is not None:
-            object.__setattr__(self, "thresholds", as_numbers("thresholds", self.thresholds))
-        if self.levels is not None:
-            object.__setattr__(self, "levels", as_numbers("levels", self.levels))
-        if not isinstance(self.dead_zones, bool):
-            zones = _core.as_count("dead_zones", self.dead_zones)
-            if zones > MOST_ZONES:
-                raise ParameterError(
-                    f"dead_zones is {zones}: expected up to {MOST_ZONES} dead zones"
-                )
-        if not (isinstance(self.creep, bool) or self._chosen):
-            object.__setattr__(self, "creep", as_numbers("creep", self.creep))
-        if self.dynamics not in (None, "auto", "first", "second"):
-            raise ParameterError(
-                f"dynamics is {quoted(self.dynamics)}: expected 'auto', None, 'first' or 'second'"
-            )
-
-    @property
-    def _chosen(self) -> bool:
-        """Whether the creep is what the record shows."""
-        return isinstance(self.creep, str) and self.creep == "auto"
-
-    def _places(self, info: ModelInfo) -> list[float] | None:
-        """Thresholds or levels that are given, whichever the model has."""
-        places = None
-        for name, given in (("thresholds", self.thresholds), ("levels", self.levels)):
-            if given is not None and name != info.places:
-                raise ParameterError(
-                    f"{name} is {quoted(given)}: expected None, as {info.title} has no {name}"
-                )
-            places = places if given is None else list(given)
-        return places
-
-    def _zones(self, info: ModelInfo) -> int:
-        if self.dead_zones is True:
-            return 2 if info.has_dead_zones else 0
-        return int(self.dead_zones)
-
-    def _times(self, data: Dataset) -> list[float] | None:
-        if isinstance(self.creep, str):
-            return None
-        if not isinstance(self.creep, bool):
-            return list(self.creep)
-        if not self.creep:
-            return []
-        shortest, longest = 5.0 * data.dt, 0.5 * data.duration
-        decades = [10.0**k for k in range(-9, 10) if shortest <= 10.0**k <= longest]
-        if not decades:
-            raise DataError(
-                f"the window of {data.duration:.4g} s is too short to show creep: expected at "
-                f"least {20.0 * shortest:.4g} s, or creep=False"
-            )
-        return decades[-MOST_RELAXATIONS:]
-
-
 def solve_least_squares(
-    records: Sequence[Asked], info: ModelInfo, settings: LeastSquares, threads: int = 0
+    problem: Problem, settings: LeastSquares, threads: int = 0
 ) -> Identification:
     """Identify a stage by least squares.
 
     Parameters
     ----------
-    records : sequence of Asked
-        The records, each with what is asked of it alone. The drive before a window is warm-up:
-        simulated, not scored.
-    info : ModelInfo
-        The model.
+    problem : Problem
+        The model and the records. The drive before a window is warm-up: simulated, not scored.
     settings : LeastSquares
         Settings.
     threads : int, optional
@@ -197,17 +68,17 @@ def solve_least_squares(
         A record does not determine the weights: its drive or its displacement is constant, the
         drive never reverses, or the window is too short.
     ParameterError
-        What is asked of a record cannot be used.
+        A setting or what is fitted of a record cannot be used.
     """
+    info, records = problem.info, problem.records
     data = records[0].data
     longest = max((one.data for one in records), key=lambda one: one.duration)
     found = _core.identify_weights(
-        [_asked(one) for one in records],
-        model=info.name,
+        problem,
         count=settings.count,
-        thresholds=settings._places(info),
-        zones=settings._zones(info),
-        creep_times=settings._times(longest),
+        thresholds=_places(settings, info),
+        zones=_zones(settings, info),
+        creep_times=_times(settings, longest),
         dynamics=settings.dynamics or "none",
         threads=threads,
     )
@@ -221,14 +92,14 @@ def solve_least_squares(
             one.name: {"free": one.name not in CHOSEN and one.held is None}
             for one in info.parameters
         },
-        "delay": {"free": True} if _is_searched(records[0]) else {},
+        "delay": {"free": True} if records[0].fits_delay else {},
         "fit": {
             **fit_entry(found.rms, data, None, spread),
             "simulations": found.evaluations,
             "at_bound": found.at_bound,
             "lag_range": {"value": found.lag_range, "unit": "s"},
         },
-        "provenance": provenance(data, least_squares=asdict(settings)),
+        "provenance": provenance(data, least_squares=settings.settings()),
     }
     return Identification(
         model=model._from(found.parameters),
@@ -250,40 +121,51 @@ def solve_least_squares(
     )
 
 
-def _asked(one: Asked) -> dict[str, Any]:
-    """Return a record and what is asked of it, as the core takes it."""
-    data = one.data
-    with of_record(one.label):
-        delay = delay_bounds(one.delay)
-        drift = drift_of_asked(one.drift, offset=one.offset, searched=False)
-    return {
-        "u": data.full.u,
-        "y": data.full.y,
-        "dt": data.dt,
-        "hold_name": data.hold,
-        "start": data.warmup,
-        "history": one.history,
-        "offset": one.offset,
-        "drift": drift,
-        "delay": delay,
-        "label": one.label,
-        "weight": one.weight,
-    }
+def _places(settings: LeastSquares, info: ModelInfo) -> list[float] | None:
+    """Thresholds or levels that are given, whichever the model has."""
+    places = None
+    for name, given in (("thresholds", settings.thresholds), ("levels", settings.levels)):
+        if given is not None and name != info.places:
+            raise ParameterError(
+                f"{name} is {quoted(given)}: expected None, as {info.title} has no {name}"
+            )
+        places = places if given is None else list(given)
+    return places
 
 
-def _is_searched(one: Asked) -> bool:
-    bounds = delay_bounds(one.delay)
-    return bounds is None or bounds[0] < bounds[1]
+def _zones(settings: LeastSquares, info: ModelInfo) -> int:
+    """Return the number of dead zones."""
+    if settings.dead_zones is True:
+        return 2 if info.has_dead_zones else 0
+    return int(settings.dead_zones)
 
 
-def _fitted(model: Any, info: ModelInfo, one: Asked, own: Mapping[str, Any]) -> FittedRecord:
+def _times(settings: LeastSquares, data: Dataset) -> list[float] | None:
+    """Time constants of the creep [s]; None where the record shows them."""
+    if isinstance(settings.creep, str):
+        return None
+    if not isinstance(settings.creep, bool):
+        return list(settings.creep)
+    if not settings.creep:
+        return []
+    shortest, longest = 5.0 * data.dt, 0.5 * data.duration
+    decades = [10.0**k for k in range(-9, 10) if shortest <= 10.0**k <= longest]
+    if not decades:
+        raise DataError(
+            f"the window of {data.duration:.4g} s is too short to show creep: expected at "
+            f"least {20.0 * shortest:.4g} s, or creep=False"
+        )
+    return decades[-MOST_RELAXATIONS:]
+
+
+def _fitted(model: Any, info: ModelInfo, one: Record, own: Mapping[str, Any]) -> FittedRecord:
     """Return what was found of a record alone."""
     data = one.data
     drift, offset = None, own["offset"]
     if own["drift"] is not None:
         amplitude, time = own["drift"]
         begin, end = float(data.t[0]), float(data.t[-1])
-        fitted = asked_drift(one.drift) is None
+        fitted = one.fits_drift_time
         drift = Drift(amplitude=amplitude, time=time, begin=begin, end=end, time_fitted=fitted)
         # What the sensor shows at rest at the end of the window.
         offset += amplitude * math.exp((begin - end) / time)
