@@ -98,13 +98,14 @@ def test_what_else_is_known_of_parameters_reaches_a_fit() -> None:
     fit = pt.identify(
         pt.read("log.csv"),
         "dahl",
-        fixed={"a1": 121.9874, "a2": 1177300.0},
-        bounds={"damping": (1000.0, 5000.0)},
-        scales={"damping": "log"},
-        ties={"b1": "1.57 * a2"},
+        parameters={
+            "a1": 121.9874,
+            "a2": 1177300.0,
+            "damping": pt.Parameter(bounds=(1000.0, 5000.0), scale="log"),
+            "b1": "1.57 * a2",
+            "mass": pt.Parameter(prior=(0.18, 0.02)),
+        },
         constraints=["damping < stiffness"],
-        priors={"mass": (0.18, 0.02)},
-        runs=1,
     )
     fit.save("expected.json")
     assert Path("results/dahl.json").read_bytes() == Path("expected.json").read_bytes()

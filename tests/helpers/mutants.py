@@ -8,6 +8,7 @@ import math
 import re
 import tempfile
 from copy import deepcopy
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any

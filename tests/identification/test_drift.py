@@ -41,7 +41,7 @@ def record(
 
 
 def found(data: Any, **given: Any) -> pt.identification.Identification:
-    asked: dict[str, Any] = {"fixed": HELD, "history": "virgin", "drift": True}
+    asked: dict[str, Any] = {"parameters": HELD, "history": "virgin", "drift": True}
     return pt.identify(data, "dahl", **asked | given)
 
 

@@ -403,7 +403,7 @@ def test_no_velocity_limit_is_a_setting() -> None:
 def test_counts_may_be_numpys(tmp_path: Path) -> None:
     # They come from arange and from random generators.
     counts: dict[str, Any] = {"particles": np.int64(12), "iterations": np.int32(30)}
-    fit = quick_fit(seed=np.int64(1), swarm=pt.ParticleSwarm(**counts))
+    fit = quick_fit(seed=np.int64(1), swarm=pt.ParticleSwarm(**counts))  # type: ignore[arg-type]
     assert bits(fit) == bits(quick_fit())
     assert pt.load(fit.save(tmp_path / "dahl.json")).model == fit.model
 

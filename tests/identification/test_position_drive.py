@@ -97,7 +97,7 @@ def test_the_fit_is_that_of_the_same_numbers_in_volts() -> None:
 
 @pytest.mark.parametrize("kind", ["prandtl-ishlinskii", "dahl", "bouc-wen"])
 def test_no_volt_is_spoken_of(kind: str) -> None:
-    fit = pt.identify(height(), kind, method=pt.Descents(seed=1))
+    fit = pt.identify(height(), kind, method=[pt.Descents(seed=1), pt.LeastSquares()])
     words = [fit.summary(), *fit.beyond_fit(3.0 * height().u, 1e-4)]
     assert len(words) == 3
     assert height().plot().axes[0].get_ylabel() == "drive [um]"

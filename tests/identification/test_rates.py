@@ -1,5 +1,7 @@
 """What a record of one rate says of others: lags that fit as well, and use beyond the record."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -59,10 +61,10 @@ def test_a_loop_that_is_damping_is_told() -> None:
 
 
 def test_a_mass_that_is_asked_for_is_searched() -> None:
-    names = ["mass", "damping", "piezo_coefficient", "rest_stiffness", "coulomb_force"]
     fit = pt.identify(
         SLOW,
         "first-order-dahl",
+        parameters={"mass": pt.Parameter()},
         method=pt.ParticleSwarm(iterations=2, polish=False, runs=1),
         progress=False,
         history="virgin",

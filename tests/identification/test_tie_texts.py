@@ -7,6 +7,7 @@ import ast
 import math
 import operator
 import re
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 

@@ -57,7 +57,11 @@ def record(
 def test_two_records_share_a_stage_and_nothing_else() -> None:
     slow = record(0.2, 20.0, 0.01, seconds=30.0, offset=2e-6)
     quick = record(3.0, 38.0, 1e-3, seconds=6.0, offset=-1e-6, drift=(4e-7, 2.0), seed=2)
-    fit = pt.identify([slow, quick], KIND, drift=[False, True], history="virgin", method=PLAYS)
+    records = [
+        pt.Record(slow, drift=False, history="virgin"),
+        pt.Record(quick, drift=True, history="virgin"),
+    ]
+    fit = pt.identify(records, KIND, method=PLAYS)
     assert fit.model.weights == pytest.approx(STAGE.weights, rel=0.01)
     assert fit.model.linear == pytest.approx(STAGE.linear, rel=0.005)
     assert fit.model.creep_weights == pytest.approx(STAGE.creep_weights, rel=0.05)
@@ -187,7 +191,7 @@ def test_a_record_without_a_drift_gets_none() -> None:
         ({"drift": float("nan")}, "drift is nan: expected"),
         ({"delay": -1.0}, "delay is -1 s: expected 0 s or above"),
         ({"delay": 100.0}, "delay is 100 s: expected 0 s or above, below the record's 12"),
-        ({"delay": (2.0, 1.0)}, r"bounds of delay are \(2, 1\) s: expected the lower one first"),
+        ({"delay": (2.0, 1.0)}, r"delay is \(2, 1\) s: expected the lower bound first"),
     ],
 )
 def test_what_is_no_drift_or_delay_is_refused(given: dict[str, Any], said: str) -> None:

@@ -141,8 +141,13 @@ def test_identification_finds_the_parameters(tmp_path: Path) -> None:
     log = pt.Dataset(u=u, y=y, dt=dt)
     searched = ["damping", "piezo_coefficient", "alpha", "beta", "gamma"]
     searched += ["asymmetry", "sign_asymmetry"]
-    held = {"mass": STAGE.mass, "stiffness": STAGE.stiffness}
-    fit = pt.identify(log, "asymmetric-bouc-wen", parameters=held, method=pt.Descents(seed=2))
+    known = {"mass": STAGE.mass, "stiffness": STAGE.stiffness}
+    fit = pt.identify(
+        log,
+        "asymmetric-bouc-wen",
+        parameters={**known, "sign_asymmetry": pt.Parameter()},
+        method=pt.Descents(seed=2),
+    )
     assert fit.cost == pytest.approx(20e-9, rel=0.05)
     for name in searched:
         assert getattr(fit.model, name) == pytest.approx(getattr(STAGE, name), rel=0.03), name

@@ -11,7 +11,7 @@ use super::parameters::tie::shown_text;
 use super::records::creep_shares::check_times;
 use super::records::history::{History, came_from};
 use super::records::record::Record;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, finite, positive};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{FoundBy, Held, Measures, Model, NOMINAL_STIFFNESS, position};
 use crate::signal::Stop;
@@ -231,7 +231,7 @@ impl Problem {
         };
         let all: Vec<Self> = asked.iter().map(searched).collect::<Result<_>>()?;
         if all.iter().all(|one| one.free().count() == 0) {
-            return Err(Error::parameter("free", "empty", "at least one parameter to search"));
+            return Err(Error::parameter("parameters", "all held", "at least one to search"));
         }
         Ok(all)
     }
@@ -359,7 +359,9 @@ fn fixed_values(spec: &Spec) -> Result<Fixed> {
     let mut given: Fixed = [None; MOST_PARAMETERS];
     for (name, value) in &spec.fixed {
         let i = position(infos, "parameters", name)?;
-        given[i] = Some(crate::error::finite(name, *value, infos[i].unit)?);
+        // A stiffness of 0 fixes no force, in place of which a nominal one would be held.
+        let check = if name == "stiffness" { positive } else { finite };
+        given[i] = Some(check(name, *value, infos[i].unit)?);
     }
     let defaults = Held::defaults(infos).values;
     let mut fixed: Fixed = core::array::from_fn(|i| given[i].or(defaults[i]));
