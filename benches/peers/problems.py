@@ -148,7 +148,7 @@ def paper() -> Problem:
     noisy = x + np.random.default_rng(1).normal(0.0, 0.097e-6, t.size)
     step = 2.5e-3 / 2**16
     held = {"a1": stage.a1, "a2": stage.a2, "b1": stage.b1}
-    asked = {"fixed": held, "bounds": SEARCH_BOX, "offset": False}
+    asked = {"parameters": {**SEARCH_BOX, **held}, "offset": False}
     return Problem(
         name="paper",
         title="The paper's search: 4 parameters, 20 001 samples",

@@ -105,7 +105,7 @@ def main() -> None:
     log = paper_log()
     stage = pt.DahlStage.xu_li_2010()
     held = {"a1": stage.a1, "a2": stage.a2, "b1": stage.b1}
-    paper = {"fixed": held, "bounds": SEARCH_BOX, "offset": False}
+    paper = {"parameters": {**SEARCH_BOX, **held}, "offset": False}
     show(
         "The paper's search",
         {
