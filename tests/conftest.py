@@ -35,7 +35,7 @@ def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
         plt.close("all")
         return []
 
-    for module in ("_support.files", "identification.report"):
+    for module in ("_support.files", "identification.views.report"):
         monkeypatch.setattr(f"piezotrack.{module}.save_figures", none)
 
 

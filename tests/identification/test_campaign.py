@@ -139,7 +139,7 @@ def test_what_failed_once_is_replaced_when_it_works(
         raise MemoryError
 
     with monkeypatch.context() as patch:
-        patch.setattr(campaign_task, "identify", out_of_memory)
+        patch.setattr(campaign_task, "solve", out_of_memory)
         found, _ = run(tmp_path, [log()], {"quick": QUICK})
     assert found[0].error == "not enough memory"
     found, tasks = run(tmp_path, [log()], {"quick": QUICK})

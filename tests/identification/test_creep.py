@@ -197,7 +197,12 @@ def test_the_search_of_several_records_ends_at_a_minimum() -> None:
 
 
 def test_the_cost_of_several_records_is_that_of_the_stage() -> None:
-    fit = together(two_records(noise=1e-7), weights=(1.0, 3.0), delay=[0.0, 1e-3])
+    first, second = two_records(noise=1e-7)
+    records = [
+        pt.Record(first, history="virgin"),
+        pt.Record(second, history="virgin", weight=3.0, delay=1e-3),
+    ]
+    fit = together(records, history=None)
     for one, score in zip(fit.records, fit.scores, strict=True):
         assert score.rms == pytest.approx(one.cost, abs=2e-10)
     counts = np.array([1.0, 3.0]) * [len(data) for data in two_records()]
@@ -248,7 +253,9 @@ def test_refuses(creep: Any, message: str) -> None:
 def test_of_models_found_by_least_squares_it_is_a_setting() -> None:
     with pytest.raises(pt.ParameterError, match="creep is True: expected none with the model"):
         pt.identify(record(), "prandtl-ishlinskii", creep=True)
-    with pytest.raises(pt.ParameterError, match="fixed is 'creep_weights': expected one of mass"):
+    with pytest.raises(
+        pt.ParameterError, match="'creep_weights': expected one of mass"
+    ):
         pt.identify(record(), "first-order-dahl", parameters={"creep_weights": 0.1})
 
 

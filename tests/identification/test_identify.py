@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -363,7 +363,7 @@ def test_where_every_simulation_fails_the_message_says_what_to_look_at() -> None
 
 def test_the_published_settings() -> None:
     # Section 3.3 of the paper; min_improvement's unit is ours.
-    assert asdict(pt.ParticleSwarm.xu_li_2010()) | {
+    assert pt.ParticleSwarm.xu_li_2010().settings() | {
         "velocity_limit": None,
         "boundary": None,
     } == {

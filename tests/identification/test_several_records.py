@@ -471,7 +471,7 @@ def identified(records: Any, given: dict[str, Any]) -> pt.identification.Identif
         (
             lambda: [slow(), quick()],
             {"model": "prandtl-ishlinskii"},
-            "parameters is {.*}: expected none with the model 'prandtl-ishlinskii'",
+            "parameters is {.*: expected none with the model 'prandtl-ishlinskii'",
         ),
         (
             lambda: own([slow(), quick()], drift=[None, True], offset=[True, False]),

@@ -365,11 +365,12 @@ class FitOptions:
                 given.setdefault(name, {})[what] = PARSERS[what](option, text)
         if self.stiffness is not None:
             said = given.setdefault("stiffness", {})
-            if said.setdefault("value", self.stiffness) != self.stiffness:
+            if "value" in said and said["value"] != self.stiffness:
                 raise ParameterError(
                     f"--stiffness is {self.stiffness:g}: expected the value given for it by --fix, "
                     "or only one of the two"
                 )
+            said["value"] = self.stiffness
         for name in self._free:
             if "value" in given.setdefault(name, {}):
                 raise ParameterError(
@@ -490,28 +491,29 @@ def of_each_log(
     weight: list[float] | None,
 ) -> list[Record]:
     """Put with each of several logs what is said of it; one value stands for all of them."""
-    from ..identification.problem.records import Record
+    from ..identification.problem.records import Record, label_of, of_record
 
     count = len(logs)
-    each = zip(
-        logs,
+    given = zip(
         each_of("--delay", delay, count),
         each_of("--drift", drift, count),
         each_of("--history", history, count),
         each_of("--weight", weight, count),
         strict=True,
     )
-    return [
-        Record(
-            log,
-            offset=offset,
-            delay=delay_asked(late),
-            drift=None if drifting is None else drift_asked(drifting),
-            history=before,  # type: ignore[arg-type]
-            weight=1.0 if counts is None else counts,
-        )
-        for log, late, drifting, before, counts in each
-    ]
+    records = []
+    for i, (log, (late, drifting, before, counts)) in enumerate(zip(logs, given, strict=True)):
+        with of_record(label_of(log, i) if count > 1 else ""):
+            record = Record(
+                log,
+                offset=offset,
+                delay=delay_asked(late),
+                drift=None if drifting is None else drift_asked(drifting),
+                history=before,  # type: ignore[arg-type]
+                weight=1.0 if counts is None else counts,
+            )
+        records.append(record)
+    return records
 
 
 def check_each_log(

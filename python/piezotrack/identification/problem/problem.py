@@ -90,19 +90,18 @@ class Problem:
 
     def _refuse_of_one_model(self) -> None:
         """Refuse what names parameters of one model; all that are searched have a stiffness."""
-        held = {"stiffness": Parameter(known.value)} if (known := self._stiffness) else {}
-        for name, value in (("parameters", self.parameters), ("constraints", self.constraints)):
-            if value and value != held:
+        others = {
+            name: one
+            for name, one in self.parameters.items()
+            if name != "stiffness" or list(_said(one)) != ["value"]
+        }
+        for name, value in (("parameters", others), ("constraints", self.constraints)):
+            if value:
                 raise ParameterError(
                     f"{name} is {quoted(value)}: expected none with model='auto'; name the "
                     "model whose parameters these are, as model='dahl'",
                     argument=name,
                 )
-
-    @property
-    def _stiffness(self) -> Parameter | None:
-        known = self.parameters.get("stiffness")
-        return None if known is None or known.value is None else known
 
     @property
     def info(self) -> ModelInfo:

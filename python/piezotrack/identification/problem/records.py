@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Delay = bool | float | tuple[float, float] | None
     Drift = bool | float | None
 
-__all__ = ["Record", "labels_of", "of_record", "records_of"]
+__all__ = ["Record", "label_of", "labels_of", "of_record", "records_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +156,8 @@ def records_of(
     for i, one in enumerate(datasets):
         if one.drive_unit != datasets[0].drive_unit:
             raise ParameterError(
-                f"the drive of {_label(one, i)} is in {one.drive_unit}: expected "
-                f"{datasets[0].drive_unit}, as that of {_label(datasets[0], 0)}",
+                f"the drive of {label_of(one, i)} is in {one.drive_unit}: expected "
+                f"{datasets[0].drive_unit}, as that of {label_of(datasets[0], 0)}",
                 argument="data",
             )
     return records
@@ -209,9 +209,9 @@ def labels_of(records: Sequence[Record]) -> tuple[str, ...]:
     """Return how messages call each record; nothing where there is one."""
     if len(records) == 1:
         return ("",)
-    return tuple(_label(one.data, i) for i, one in enumerate(records))
+    return tuple(label_of(one.data, i) for i, one in enumerate(records))
 
 
-def _label(data: Dataset, i: int) -> str:
+def label_of(data: Dataset, i: int) -> str:
     """Return how messages call a record."""
     return f"record {i + 1}" + (f" ({data.source})" if data.source else "")
