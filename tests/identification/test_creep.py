@@ -253,9 +253,7 @@ def test_refuses(creep: Any, message: str) -> None:
 def test_of_models_found_by_least_squares_it_is_a_setting() -> None:
     with pytest.raises(pt.ParameterError, match="creep is True: expected none with the model"):
         pt.identify(record(), "prandtl-ishlinskii", creep=True)
-    with pytest.raises(
-        pt.ParameterError, match="'creep_weights': expected one of mass"
-    ):
+    with pytest.raises(pt.ParameterError, match="'creep_weights': expected one of mass"):
         pt.identify(record(), "first-order-dahl", parameters={"creep_weights": 0.1})
 
 

@@ -204,7 +204,7 @@ def test_the_file_says_where_the_numbers_come_from(tmp_path: Path) -> None:
     assert provenance["seed"] == 1
     swarm = fitted().swarm
     assert swarm is not None
-    assert provenance["swarm"] == asdict(swarm)
+    assert provenance["swarm"] == swarm.settings()
     data = provenance["data"]
     # The hash as the documentation has it: dt, the drive and displacement kept, the warm-up.
     kept = quick()[:3.0]

@@ -87,8 +87,21 @@ class Objective:
         )
 
     @classmethod
-    def of(cls, problem: Problem, threads: int = 0) -> Self:
-        """Return the cost that the solution of a problem minimises."""
+    def _of(cls, problem: Problem, threads: int = 0) -> Self:
+        """Return the cost that the solution of a problem minimises.
+
+        Parameters
+        ----------
+        problem : Problem
+            A model that is searched, and one record.
+        threads : int, optional
+            All cores where it is 0.
+
+        Returns
+        -------
+        Objective
+            The cost.
+        """
         objective = cls.__new__(cls)
         objective._enter(problem, threads)
         return objective

@@ -72,7 +72,7 @@ def earlier_motion(problem: Problem, fit: Identification, threads: int) -> list[
 
     def objective_of(part: Dataset, history: History) -> Objective:
         with_history = replace(record, data=part, history=history)
-        return Objective.of(replace(problem, records=(with_history,)), threads)
+        return Objective._of(replace(problem, records=(with_history,)), threads)
 
     def lowest(objective: Objective) -> float:
         return float(objective.descend(_starts(objective, fit))[1].min())

@@ -194,8 +194,9 @@ def plot_convergence(
     --------
     >>> from matplotlib.figure import Figure
     >>> import piezotrack as pt
-    >>> log, few = pt.datasets.dbo_training()[3.0:5.0], pt.ParticleSwarm(iterations=3)
-    >>> fit = pt.identify(log, "dahl", swarm=few, runs=1, seed=1, progress=False)
+    >>> log = pt.datasets.dbo_training()[3.0:5.0]
+    >>> few = pt.ParticleSwarm(iterations=3, seed=1, runs=1)
+    >>> fit = pt.identify(log, "dahl", method=few, progress=False)
     >>> ax = pt.identification.plot_convergence(fit, ax=Figure().subplots())
     >>> ax.get_ylabel()
     'best cost, rms [um]'
