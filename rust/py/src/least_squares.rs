@@ -105,7 +105,6 @@ fn dynamics_named(name: &str) -> Result<DynamicsKind> {
 #[pyo3(name = "identify_weights", signature = (problem, *, count, thresholds, zones, creep_times,
     dynamics, threads))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
-#[expect(clippy::needless_pass_by_value, reason = "from Python")]
 fn fit_weights(
     py: Python<'_>,
     problem: PyProblem<'_>,

@@ -137,7 +137,11 @@ impl PyParameter {
     /// Enters what is said of it; of one that nothing is said of, that it is searched.
     fn enter(self, name: String, spec: &mut Spec) {
         let Self { value, bounds, scale, tie, prior } = self;
-        if value.is_none() && bounds.is_none() && scale.is_none() && tie.is_none() && prior.is_none()
+        if value.is_none()
+            && bounds.is_none()
+            && scale.is_none()
+            && tie.is_none()
+            && prior.is_none()
         {
             spec.free.push(name);
             return;

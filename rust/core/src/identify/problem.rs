@@ -154,8 +154,7 @@ impl Problem {
             records.iter().map(|record| record.window.len()).sum(),
         )?;
         check_tied(spec, &relations, &mut fixed)?;
-        let free: Free =
-            core::array::from_fn(|i| fixed[i].is_none() && !relations.is_tied(i));
+        let free: Free = core::array::from_fn(|i| fixed[i].is_none() && !relations.is_tied(i));
         let has_scale = infos.iter().any(|info| info.carries_force);
         let holds_scale = !has_scale
             || infos
