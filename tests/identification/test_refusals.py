@@ -191,3 +191,22 @@ BAD_SETTINGS: list[tuple[str, Any]] = [
 def test_refuses_a_bad_setting_of_the_swarm(name: str, value: Any) -> None:
     with pytest.raises(pt.ParameterError, match=f"^{name} is .*: expected "):
         pt.ParticleSwarm(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "argument"),
+    [
+        ({"parameters": {"mass": -1.0}}, "mass"),
+        ({"parameters": {"weight": 1.0}}, "parameters"),
+        ({"constraints": "a2 < b1"}, "constraints"),
+        ({"method": 5}, "method"),
+        ({"drift": -1.0}, "drift"),
+        ({"delay": "long"}, "delay"),
+        ({"threads": -1}, "threads"),
+        ({"model": "unknown"}, "model"),
+    ],
+)
+def test_an_error_has_the_name_of_its_argument(arguments: dict[str, Any], argument: str) -> None:
+    with pytest.raises(pt.ParameterError) as caught:
+        pt.identify(quick(), **{"model": "dahl", **arguments})
+    assert caught.value.argument == argument
