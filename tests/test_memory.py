@@ -14,6 +14,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 PREPARED = """
+import dataclasses
 reference = pt.sine(frequency=1.0, low=0.0, high=5e-5, duration=100.0)
 loop = pt.Controller(dt=1e-4, limits=(0.0, 75.0), feedback=pt.Pid.from_um(kp=0.01, ti=0.1, td=0.0))
 repetitive = pt.Controller(dt=1e-6, limits=(0.0, 75.0), repetitive=pt.Repetitive(period=9.9))
@@ -48,7 +49,7 @@ NONE = {
     "loop": "pt.track(stage, loop, reference, substeps=90)",
     "circle": "circle.errors(many, many)",
     "path": "figure.errors(many, many)",
-    "swarm": "pt.identify(log, 'dahl', swarm=swarm, runs=10)",
+    "swarm": "pt.identify(log, 'dahl', method=dataclasses.replace(swarm, runs=10))",
     "refinement": "pt.identify(long, 'dahl', threads=16)",
 }
 
@@ -83,7 +84,7 @@ TOO_MANY = {
         "ParameterError period is 990 s: expected from 2 to 1e7 sampling intervals",
     ),
     "particles": (
-        "pt.identify(log, 'dahl', swarm=swarm, runs=10_000)",
+        "pt.identify(log, 'dahl', method=dataclasses.replace(swarm, runs=10_000))",
         "ParameterError runs is 10000: expected 10 at most with 100000 particles in each: "
         "1000000 together",
     ),

@@ -23,7 +23,7 @@ def test_page_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_log(pt.VirtualStage.xu_li_2010(seed=1).record(drive, 1 / 200.0), tmp_path / "stage.csv")
 
     log = pt.read("stage.csv")
-    fit = pt.identify(log[3.0:23.0], model="dahl", seed=1)
+    fit = pt.identify(log[3.0:23.0], model="dahl", method=pt.Descents(seed=1))
     assert re.search(r"Dahl, second order: stage identified from .*stage\.csv", fit.summary())
     assert len(fit.plot().axes) >= 4
     fit.save("dahl.json")

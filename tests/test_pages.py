@@ -60,14 +60,21 @@ FITS: dict[str, Any] = {}
 
 def fitted_once(data: Any, *arguments: Any, **options: Any) -> Any:
     """Identify, but the same record once only: README and pages fit the same one."""
-    if not isinstance(data, pt.Dataset):
-        return identify(data, *arguments, **options)
     # The command line says what the default is.
-    said = {key: value for key, value in options.items() if (key, value) != ("offset", True)}
+    said = {key: value for key, value in options.items() if value is not None}
+    given = data
+    if isinstance(given, pt.Record):
+        own = {key: value for key, value in vars(given).items() if value is not None}
+        data, said = own.pop("data"), {**own, **said}
+    if not isinstance(data, pt.Dataset):
+        return identify(given, *arguments, **options)
+    for key, usual in (("offset", True), ("weight", 1.0)):
+        if said.get(key) == usual:
+            del said[key]
     record = (data.full.sha256, data.t[0], data.t[-1], data.source)
     key = repr((record, arguments, sorted(said.items())))
     if key not in FITS or data.full.duration < 30.0:
-        FITS[key] = identify(data, *arguments, **options)
+        FITS[key] = identify(given, *arguments, **options)
     return FITS[key]
 
 

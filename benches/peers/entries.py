@@ -60,17 +60,19 @@ class Own:
 
 
 OWN = (
-    Own("piezotrack, paper's swarm", {"swarm": PAPER_SWARM, "runs": 1}, (PAPER,), whole=True),
+    Own(
+        "piezotrack, paper's swarm", {"method": replace(PAPER_SWARM, runs=1)}, (PAPER,), whole=True
+    ),
     Own("piezotrack, default call"),
-    Own("piezotrack, default swarm, one run", {"method": "swarm", "runs": 1}),
+    Own("piezotrack, default swarm, one run", {"method": pt.ParticleSwarm(runs=1)}),
     Own("piezotrack, history not given", {"history": None}, (LOG,)),
 )
 
 # Searches side by side in one call, against as many of a peer's one after the other.
 MANY = 32
 OWN_MANY = (
-    Own("piezotrack, paper's swarm", {"swarm": PAPER_SWARM, "runs": MANY}, (PAPER,)),
-    Own("piezotrack, default", {"runs": MANY}, (PAPER,)),
+    Own("piezotrack, paper's swarm", {"method": replace(PAPER_SWARM, runs=MANY)}, (PAPER,)),
+    Own("piezotrack, default", {"method": pt.Descents(runs=MANY)}, (PAPER,)),
 )
 
 PEERS = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -148,7 +148,7 @@ def paper() -> Problem:
     noisy = x + np.random.default_rng(1).normal(0.0, 0.097e-6, t.size)
     step = 2.5e-3 / 2**16
     held = {"a1": stage.a1, "a2": stage.a2, "b1": stage.b1}
-    asked = {"fixed": held, "bounds": SEARCH_BOX, "offset": False}
+    asked = {"parameters": {**SEARCH_BOX, **held}, "offset": False}
     return Problem(
         name="paper",
         title="The paper's search: 4 parameters, 20 001 samples",
@@ -167,7 +167,7 @@ def measured() -> Problem:
     """The Dahl model on a measured log, with all parameters that the log shows."""
     log = pt.datasets.dbo_training()[3.0:23.0]
     short = pt.ParticleSwarm(particles=2, iterations=1, polish=False)
-    fit = pt.identify(log, "dahl", history="virgin", swarm=short, runs=1)
+    fit = pt.identify(log, "dahl", history="virgin", method=replace(short, runs=1))
     # piezotrack holds the stiffness, which is the scale, and a mass too small to matter.
     found = {name: fit.parameters[name] for name in NAMES}
     return Problem(

@@ -14,6 +14,7 @@ import platform
 import time
 import warnings
 from contextlib import chdir, suppress
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -126,9 +127,14 @@ def identify(problem: Problem, own: Own, seed: int, threads: int) -> tuple[Row, 
         if not course or 1e6 * progress.cost < course[-1][2]:
             course.append((time.perf_counter() - began, progress.nfev, 1e6 * progress.cost))
 
-    arguments = {**problem.arguments, **own.arguments}
+    arguments = {"method": pt.Descents(), **problem.arguments, **own.arguments}
+    arguments["method"] = replace(arguments["method"], seed=seed)
     fit = pt.identify(
-        problem.log, seed=seed, threads=threads, progress=False, callback=follow, **arguments
+        problem.log,
+        threads=threads,
+        progress=False,
+        callback=follow,
+        **arguments,
     )
     seconds = time.perf_counter() - began
     simulations = fit.nfev + fit.npolish

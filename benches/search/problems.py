@@ -113,7 +113,7 @@ PROBLEMS = {
         "Dahl, the paper's four parameters",
         paper,
         "dahl",
-        {"fixed": _HELD, "bounds": SEARCH_BOX, "offset": False},
+        {"parameters": {**SEARCH_BOX, **_HELD}, "offset": False},
     ),
     "measured": Problem("Dahl, all, measured log", measured, "dahl"),
     "swelling": Problem("Dahl, all, swelling sine on plays", swelling, "dahl"),

@@ -84,7 +84,7 @@ def two_tones() -> pt.Dataset:
 
 def run_costs(log: pt.Dataset, swarm: pt.ParticleSwarm, **arguments: object) -> np.ndarray:
     """Cost of each run [um]."""
-    fit = pt.identify(log, swarm=swarm, runs=RUNS, **arguments)
+    fit = pt.identify(log, method=replace(swarm, runs=RUNS), **arguments)
     return 1e6 * np.array([run.cost for run in fit.runs])
 
 
@@ -105,7 +105,7 @@ def main() -> None:
     log = paper_log()
     stage = pt.DahlStage.xu_li_2010()
     held = {"a1": stage.a1, "a2": stage.a2, "b1": stage.b1}
-    paper = {"fixed": held, "bounds": SEARCH_BOX, "offset": False}
+    paper = {"parameters": {**SEARCH_BOX, **held}, "offset": False}
     show(
         "The paper's search",
         {

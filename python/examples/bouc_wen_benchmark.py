@@ -66,7 +66,9 @@ def main() -> None:
     # drive by 0.7 % at the resonance: the record is interpolated.
     log = log[SAMPLES / COARSE :].interpolate(2)
     began = time.perf_counter()
-    fit = pt.identify(log, "bouc-wen-oscillator", fixed={"beta": true.beta}, seed=1)
+    fit = pt.identify(
+        log, "bouc-wen-oscillator", parameters={"beta": true.beta}, method=pt.Descents(seed=1)
+    )
     spent = time.perf_counter() - began
     fit.save("oscillator.json")
     print(

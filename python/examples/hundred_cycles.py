@@ -29,7 +29,12 @@ def stages() -> dict[str, pt.DahlStage | pt.FirstOrderDahlStage]:
     second = pt.DahlStage.xu_li_2010()
     u = drive(2)
     log = pt.Dataset(u=u, y=second.simulate(u, 1 / RATE).x, dt=1 / RATE)
-    fit = pt.identify(log[4.0:], "first-order-dahl", stiffness=second.stiffness, seed=1)
+    fit = pt.identify(
+        log[4.0:],
+        "first-order-dahl",
+        parameters={"stiffness": second.stiffness},
+        method=pt.Descents(seed=1),
+    )
     print(fit.summary(), end="\n\n")
     return {"second order, Table 1": second, "first order": fit.model}
 

@@ -16,7 +16,7 @@ def main() -> None:
     """Identify the first half of a log and judge the model on the second."""
     log = pt.read(sys.argv[1]) if len(sys.argv) > 1 else demo_log().decimate(20)
     middle = 0.5 * (log.t[0] + log.t[-1])
-    fit = pt.identify(log[:middle], "dahl", seed=1)
+    fit = pt.identify(log[:middle], "dahl", method=pt.Descents(seed=1))
     print(fit.summary())
     # The drive of the first half is warm-up for the second: hysteresis remembers.
     print("\nsecond half, not fitted:", fit.score(log[middle:], offset=fit.offset))

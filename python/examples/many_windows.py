@@ -21,9 +21,8 @@ def main() -> None:
     records = {f"{begin} to {begin + 3} s": log.cut(begin, begin + 3) for begin in (3, 8, 13, 18)}
     # Short swarms without a descent, for an example: the default ones agree far more often.
     short = {
-        "swarm": pt.ParticleSwarm(particles=12, iterations=40, polish=False),
+        "method": pt.ParticleSwarm(particles=12, iterations=40, polish=False, runs=1),
         "history": "settled",
-        "runs": 1,
     }
     models = {kind: {"model": kind, **short} for kind in ("first-order-dahl", "bouc-wen")}
     found = pt.campaign(records, models, range(6), folder="windows")

@@ -23,14 +23,16 @@ log = stage.record(37.5 * (1.0 - np.cos(2.0 * np.pi * 0.25 * t)), dt)
 fit = pt.identify(
     log[0:4.0],
     "dahl",
-    fixed={"a1": 121.9874, "a2": 1.1773e6, "b1": 1.8485e6},
-    bounds={
+    parameters={
         "mass": (0.1, 0.2),
         "damping": (1000.0, 5000.0),
         "stiffness": (1e4, 5e4),
         "piezo_coefficient": (0.01, 0.1),
+        "a1": 121.9874,
+        "a2": 1.1773e6,
+        "b1": 1.8485e6,
     },
-    seed=1,
+    method=pt.Descents(seed=1),
 )
 print(f"model: {fit.score(log[4.0:])} on the 8 s that were not fitted\n")
 

@@ -32,14 +32,16 @@ def model(stage: pt.VirtualStage) -> pt.identification.Identification:
     return pt.identify(
         log,
         "dahl",
-        fixed={"a1": 121.9874, "a2": 1.1773e6, "b1": 1.8485e6},
-        bounds={
+        parameters={
             "mass": (0.1, 0.2),
             "damping": (1000.0, 5000.0),
             "stiffness": (1e4, 5e4),
             "piezo_coefficient": (0.01, 0.1),
+            "a1": 121.9874,
+            "a2": 1.1773e6,
+            "b1": 1.8485e6,
         },
-        seed=1,
+        method=pt.Descents(seed=1),
     )
 
 

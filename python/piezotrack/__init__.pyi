@@ -49,7 +49,10 @@ from .identification.experiments.step_response import identify_step as identify_
 from .identification.fit import identify as identify
 from .identification.fitted.model_file import load as load
 from .identification.methods.descents import Descents as Descents
+from .identification.methods.least_squares import LeastSquares as LeastSquares
 from .identification.methods.particle_swarm import ParticleSwarm as ParticleSwarm
+from .identification.problem.parameter import Parameter as Parameter
+from .identification.problem.records import Record as Record
 from .references.parse import parse_reference as parse_reference
 from .references.paths import circle as circle
 from .references.paths import lissajous as lissajous

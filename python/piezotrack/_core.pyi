@@ -4,6 +4,8 @@ from typing import Any, Literal, Protocol, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .identification.problem.problem import Problem
+
 __all__ = [
     "Checkpoint",
     "Controller",
@@ -69,7 +71,7 @@ def visited(
     u: ArrayLike, dt: float, hold_name: str, history: str, before: float
 ) -> NDArray[np.float64]: ...
 def identify(
-    questions: list[dict[str, Any]],
+    problem: Problem,
     *,
     method: SwarmSettings | DescentSettings,
     seed: int,
@@ -171,7 +173,7 @@ class Swarm:
 
 @final
 class Objective:
-    def __new__(cls, question: dict[str, Any], threads: int) -> Objective: ...
+    def __new__(cls, problem: Problem, threads: int) -> Objective: ...
     @property
     def coordinates(self) -> list[tuple[str, float, float, str]]: ...
     def costs(self, places: list[list[float]]) -> list[float]: ...
@@ -539,9 +541,8 @@ class LeastSquaresFit:
     def lag_range(self) -> tuple[float, float] | None: ...
 
 def identify_weights(
-    records: Sequence[dict[str, Any]],
+    problem: Problem,
     *,
-    model: str,
     count: int | None,
     thresholds: Sequence[float] | None,
     zones: int,

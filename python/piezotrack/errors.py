@@ -46,7 +46,17 @@ def _shortened(text: str) -> str:
 
 
 class ParameterError(PiezotrackError, ValueError):
-    """An argument has a value that cannot be used: names it, its value, what was expected."""
+    """An argument has a value that cannot be used: names it, its value, what was expected.
+
+    Attributes
+    ----------
+    argument : str or None
+        Name of the argument, where the error is about one.
+    """
+
+    def __init__(self, message: str = "", *, argument: str | None = None) -> None:
+        super().__init__(message)
+        self.argument = argument
 
 
 class ShapeError(PiezotrackError, ValueError):

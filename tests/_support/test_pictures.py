@@ -73,7 +73,7 @@ def traced() -> pt.control.Contour:
 
 def of_two_records(models: tuple[str, ...]) -> pt.identification.Campaign:
     """Three seeds of a search and one that finds nothing, or least squares alone."""
-    given = {"flat": {**QUICK, "bounds": {"mass": (1.0, 0.5)}}, "quick": QUICK, "plays": PI}
+    given = {"flat": {**QUICK, "parameters": {"mass": (1.0, 0.5)}}, "quick": QUICK, "plays": PI}
     records = {"first": log(), "$second_name": log()[1.0:]}
     with TemporaryDirectory() as folder:
         return pt.campaign(records, {one: given[one] for one in models}, range(3), folder=folder)

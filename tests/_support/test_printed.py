@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -110,7 +111,7 @@ def test_a_notebook_shows_tables_without_markup_of_the_record() -> None:
 
 def test_a_table_of_a_search_has_every_parameter() -> None:
     few = pt.ParticleSwarm(iterations=5)
-    fit = pt.identify(log(), "dahl", swarm=few, seed=1, runs=1, progress=False)
+    fit = pt.identify(log(), "dahl", method=replace(few, seed=1, runs=1), progress=False)
     table = fit._repr_html_()
     for name in fit.parameters:
         assert f"<th>{name}</th>" in table

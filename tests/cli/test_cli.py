@@ -48,7 +48,9 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_identify_writes_what_python_finds() -> None:
     printed = ran("identify", "log.csv", *PAPER, "--seed", "3")
-    fit = pt.identify(pt.read("log.csv"), "dahl", fixed=HELD, bounds=BOX, seed=3)
+    fit = pt.identify(
+        pt.read("log.csv"), "dahl", parameters={**BOX, **HELD}, method=pt.Descents(seed=3)
+    )
     assert names("results") == RESULTS
     model = pt.load("results/dahl.json")
     assert model.model == fit.model
@@ -69,14 +71,17 @@ def test_every_option_of_a_fit_reaches_it() -> None:
     fit = pt.identify(
         pt.read("log.csv", hold="zoh")[1.0:3.0],
         "dahl",
-        fixed={"a1": 121.9874, "a2": 1177300.0, "mass": 0.1828},
-        bounds={"damping": (1000.0, 5000.0)},
-        free=["damping", "piezo_coefficient", "b1"],
-        stiffness=26065.0,
+        parameters={
+            "damping": (1000.0, 5000.0),
+            "a1": 121.9874,
+            "a2": 1177300.0,
+            "mass": 0.1828,
+            "stiffness": 26065.0,
+            "piezo_coefficient": pt.Parameter(),
+            "b1": pt.Parameter(),
+        },
         offset=False,
-        swarm=pt.ParticleSwarm.xu_li_2010(),
-        seed=7,
-        runs=2,
+        method=pt.ParticleSwarm.xu_li_2010(seed=7, runs=2),
     )
     fit.save("expected.json")
     assert Path("a/b/dahl.json").read_bytes() == Path("expected.json").read_bytes()
@@ -93,13 +98,14 @@ def test_what_else_is_known_of_parameters_reaches_a_fit() -> None:
     fit = pt.identify(
         pt.read("log.csv"),
         "dahl",
-        fixed={"a1": 121.9874, "a2": 1177300.0},
-        bounds={"damping": (1000.0, 5000.0)},
-        scales={"damping": "log"},
-        ties={"b1": "1.57 * a2"},
+        parameters={
+            "a1": 121.9874,
+            "a2": 1177300.0,
+            "damping": pt.Parameter(bounds=(1000.0, 5000.0), scale="log"),
+            "b1": "1.57 * a2",
+            "mass": pt.Parameter(prior=(0.18, 0.02)),
+        },
         constraints=["damping < stiffness"],
-        priors={"mass": (0.18, 0.02)},
-        runs=1,
     )
     fit.save("expected.json")
     assert Path("results/dahl.json").read_bytes() == Path("expected.json").read_bytes()
@@ -129,7 +135,7 @@ def test_columns_and_units_can_be_named() -> None:
 def test_a_window_may_be_open(window: str) -> None:
     ran("identify", "log.csv", *PAPER, "--window", window, "--threads", "1")
     start, stop = (float(text) if text else None for text in window.split(":"))
-    fit = pt.identify(pt.read("log.csv")[start:stop], "dahl", fixed=HELD, bounds=BOX)
+    fit = pt.identify(pt.read("log.csv")[start:stop], "dahl", parameters={**BOX, **HELD})
     assert pt.load("results/dahl.json").model == fit.model
 
 
@@ -152,7 +158,10 @@ def test_several_kinds_are_identified_in_one_go() -> None:
     printed = ran("identify", "log.csv", *models, "--window", "1:", "--seed", "2", "--runs", "1")
     assert names("results") == ["dahl.json", "prandtl-ishlinskii.json"]
     log = pt.read("log.csv")[1.0:]
-    for fit in (pt.identify(log, "prandtl-ishlinskii"), pt.identify(log, "dahl", seed=2, runs=1)):
+    for fit in (
+        pt.identify(log, "prandtl-ishlinskii"),
+        pt.identify(log, "dahl", method=pt.Descents(seed=2)),
+    ):
         assert as_printed(fit.summary()) in printed
         expected = fit.save("expected.json").read_bytes()
         assert Path("results", f"{fit.model.info.name}.json").read_bytes() == expected
@@ -162,7 +171,7 @@ def test_several_kinds_are_identified_in_one_go() -> None:
 @pytest.mark.usefixtures("_no_pictures")
 def test_by_default_the_kind_that_suits_the_log_is_found() -> None:
     printed = ran("identify", "log.csv", "--seed", "2", "--runs", "1")
-    fit = pt.identify(pt.read("log.csv"), seed=2, runs=1)
+    fit = pt.identify(pt.read("log.csv"), method=pt.Descents(seed=2))
     assert as_printed(fit.summary()) in printed
     expected = fit.save("expected.json").read_bytes()
     assert names("results") == [f"{fit.model.info.name}.json"]

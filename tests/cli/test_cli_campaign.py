@@ -53,7 +53,11 @@ def test_options_of_identify_and_seeds_reach_the_tasks() -> None:
     found = pt.identification.Campaign.load("campaign")
     assert [one.seed for one in found] == [3, 4]
     fit = pt.identify(
-        pt.read("a.csv")[1.0:5.0], "dahl", seed=3, runs=1, history="virgin", fixed={"a1": 122.0}
+        pt.read("a.csv")[1.0:5.0],
+        "dahl",
+        method=pt.Descents(seed=3),
+        history="virgin",
+        parameters={"a1": 122.0},
     )
     assert found[0].fit.model == fit.model
 

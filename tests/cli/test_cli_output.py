@@ -103,9 +103,7 @@ def test_json_has_the_figures_of_the_files() -> None:
     assert model == json.loads(Path("results/prandtl-ishlinskii.json").read_text())
     assert (
         notes
-        == pt.identify(
-            pt.read("log.csv"), "prandtl-ishlinskii", least_squares=LeastSquares(count=3)
-        ).notes
+        == pt.identify(pt.read("log.csv"), "prandtl-ishlinskii", method=LeastSquares(count=3)).notes
     )
     assert model["validation"]["rms"]["unit"] == "m"
     document = json.loads(ran("simulate", "dahl.json", "drive.csv", "--json"))
@@ -128,7 +126,7 @@ def test_settings_of_least_squares_reach_the_fit() -> None:
     options = "--plays 5 --asymmetry 1 --dynamics lag --creep 0.5,2"
     ran("identify", "log.csv", "--model", "prandtl-ishlinskii", *options.split(), "--quiet")
     settings = LeastSquares(count=5, dead_zones=1, dynamics="first", creep=[0.5, 2.0])
-    fit = pt.identify(pt.read("log.csv"), "prandtl-ishlinskii", least_squares=settings)
+    fit = pt.identify(pt.read("log.csv"), "prandtl-ishlinskii", method=settings)
     found = pt.load("results/prandtl-ishlinskii.json").model
     assert found == fit.model
     assert (len(found.weights), found.creep_times) == (5, (0.5, 2.0))

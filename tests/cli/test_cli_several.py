@@ -40,14 +40,13 @@ def test_several_logs_give_one_model() -> None:
     weights = ("--weight", "1", "--weight", "2")
     printed = ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, *options, *weights)
     fit = pt.identify(
-        [pt.read("a.csv")[0.0:3.0], pt.read("b.csv")[0.4:]],
+        [
+            pt.Record(pt.read("a.csv")[0.0:3.0], delay=0.0, history="virgin"),
+            pt.Record(pt.read("b.csv")[0.4:], delay=True, history="virgin", weight=2.0),
+        ],
         "dahl",
-        stiffness=26065.0,
-        fixed=HELD,
-        history="virgin",
-        delay=[0.0, True],
-        weights=[1.0, 2.0],
-        seed=1,
+        parameters={**HELD, "stiffness": 26065.0},
+        method=pt.Descents(seed=1),
     )
     read = pt.load("results/dahl.json")
     assert read.model == fit.model

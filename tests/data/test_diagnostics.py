@@ -74,7 +74,9 @@ def test_nothing_is_said_of_measured_logs() -> None:
             diagnostics.check_record(record, searches_hysteresis=True)
             assert diagnostics.record_warnings(record) == []
     # Of one slow sine, the Dahl model takes damping for a part of the loop's width.
-    fit = pt.identify(pt.read(MEASURED / "training.csv")[3.0:23.0], "dahl", seed=1)
+    fit = pt.identify(
+        pt.read(MEASURED / "training.csv")[3.0:23.0], "dahl", method=pt.Descents(seed=1)
+    )
     assert re.match(r"a lag of .* ms makes .* of the travel at this rate", fit.notes[0])
 
 
@@ -86,14 +88,14 @@ def test_nothing_is_said_of_measured_logs() -> None:
 )
 def test_a_drive_that_never_reverses_is_refused(u: NDArray[np.float64]) -> None:
     with pytest.raises(pt.DataError, match=r"the drive never reverses: .* up and down, or hold"):
-        pt.identify(pt.Dataset(u=u, y=1.5e-6 * u, dt=1 / RATE), "dahl", swarm=SMALL)
+        pt.identify(pt.Dataset(u=u, y=1.5e-6 * u, dt=1 / RATE), "dahl", method=SMALL)
 
 
 def test_unless_hysteresis_is_held() -> None:
-    fit = pt.identify(log(75.0 * T / 4.0), "dahl", fixed=HELD, bounds=BOX, swarm=SMALL)
+    fit = pt.identify(log(75.0 * T / 4.0), "dahl", parameters={**BOX, **HELD}, method=SMALL)
     assert "the drive never reverses: this record does not determine the hysteresis" in fit.notes
     step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
-    pt.identify(log(75.0 * T / 4.0), "dahl", initial=step, bounds=BOX, swarm=SMALL)
+    pt.identify(log(75.0 * T / 4.0), "dahl", parameters={**step.parameters, **BOX}, method=SMALL)
 
 
 def test_the_drive_before_the_window_counts() -> None:
@@ -111,7 +113,7 @@ def test_the_core_refuses_first_what_tells_nothing() -> None:
         (quick()[1.0:1.02], "the window has 5 samples"),
     ):
         with pytest.raises(pt.DataError, match=message):
-            pt.identify(record, "dahl", swarm=SMALL)
+            pt.identify(record, "dahl", method=SMALL)
 
 
 # Remarks on a record.
@@ -194,7 +196,7 @@ def lopsided() -> pt.Dataset:
 
 
 def test_a_loop_that_the_model_cannot_describe_is_named() -> None:
-    fit = pt.identify(lopsided(), "dahl", seed=1, runs=2)
+    fit = pt.identify(lopsided(), "dahl", method=pt.Descents(seed=1, runs=2))
     (note,) = [note for note in fit.notes if note.startswith("the loop")]
     for piece in ("is asymmetric", "this model cannot describe", "um near", "the drive going"):
         assert piece in note
@@ -202,7 +204,7 @@ def test_a_loop_that_the_model_cannot_describe_is_named() -> None:
 
 
 def test_where_hysteresis_was_held_it_says_so() -> None:
-    fit = pt.identify(lopsided(), "dahl", fixed=HELD, seed=1, runs=2)
+    fit = pt.identify(lopsided(), "dahl", parameters=HELD, method=pt.Descents(seed=1, runs=2))
     (note,) = [note for note in fit.notes if note.startswith("the loop")]
     assert "a1, a2, b1 were held fixed: identify all" in note
 

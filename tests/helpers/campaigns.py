@@ -23,14 +23,18 @@ PLAYS = "prandtl-ishlinskii"
 QUICK: dict[str, Any] = {
     "model": "dahl",
     "history": "virgin",
-    "runs": 1,
-    "swarm": pt.ParticleSwarm(particles=16, iterations=20, polish=False),
+    "method": pt.ParticleSwarm(particles=16, iterations=20, polish=False, runs=1),
 }
 # Long enough for a worker to be killed in the middle.
 LONGER: dict[str, Any] = {
     **QUICK,
-    "swarm": pt.ParticleSwarm(
-        particles=64, iterations=5000, stall_iterations=5000, min_improvement=0.0, polish=False
+    "method": pt.ParticleSwarm(
+        particles=64,
+        iterations=5000,
+        stall_iterations=5000,
+        min_improvement=0.0,
+        polish=False,
+        runs=1,
     ),
 }
 

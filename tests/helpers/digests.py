@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import sys
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -26,13 +27,17 @@ def digests(threads: int) -> list[str]:
     lines = []
     for kind, runs in product(SEARCHED, (1, 3)):
         fit = pt.identify(
-            data, kind, swarm=small, seed=9, runs=runs, threads=threads, delay=kind == "dahl"
+            data,
+            kind,
+            method=replace(small, seed=9, runs=runs),
+            threads=threads,
+            delay=kind == "dahl",
         )
         lines.append(f"{kind} {runs} {digest(fit)}")
     lines += [f"{kind} {digest(pt.identify(data, kind))}" for kind in PLAYS]
     for update, topology in product(UPDATES, TOPOLOGIES):
         swarm = pt.ParticleSwarm(particles=9, iterations=8, update=update, topology=topology)
-        fit = pt.identify(data, "dahl", swarm=swarm, seed=3, threads=threads, runs=2)
+        fit = pt.identify(data, "dahl", method=replace(swarm, seed=3, runs=2), threads=threads)
         lines.append(f"{update} {topology} {digest(fit)}")
     return lines
 

@@ -27,7 +27,9 @@ def record() -> pt.Dataset:
 @cache
 def fitted() -> pt.identification.Identification:
     """The first 4 s, with a1, a2 and b1 held at Table 1's."""
-    return pt.identify(record()[:4.0], "dahl", fixed=HELD, bounds=BOX, seed=1)
+    return pt.identify(
+        record()[:4.0], "dahl", parameters={**BOX, **HELD}, method=pt.Descents(seed=1)
+    )
 
 
 def forward() -> pt.Inverse:

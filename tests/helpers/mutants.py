@@ -8,6 +8,7 @@ import math
 import re
 import tempfile
 from copy import deepcopy
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -105,7 +106,10 @@ def models() -> list[str]:
     small = pt.ParticleSwarm(particles=8, iterations=4)
     kinds = ("dahl", "bouc-wen", "first-order-dahl", "parallel-dahl", "bouc-wen-oscillator")
     fits = [
-        *(pt.identify(data, k, swarm=small, runs=1, threads=1, delay=k == "dahl") for k in kinds),
+        *(
+            pt.identify(data, k, method=replace(small, runs=1), threads=1, delay=k == "dahl")
+            for k in kinds
+        ),
         *(pt.identify(data, k) for k in ("prandtl-ishlinskii", "generalised-prandtl-ishlinskii")),
     ]
     older = sorted((Path(__file__).parents[1] / "files").glob("*.json"))

@@ -39,6 +39,5 @@ def fit_plays(
     data: pt.Dataset, *, offset: bool = True, drift: bool | None = None, **settings: Any
 ) -> pt.identification.Identification:
     """Identify a Prandtl-Ishlinskii stage with these settings of the least squares."""
-    least_squares = pt.identification.LeastSquares(**settings)
-    asked: dict[str, Any] = {"offset": offset, "drift": drift, "least_squares": least_squares}
-    return pt.identify(data, "prandtl-ishlinskii", **asked)
+    method = pt.LeastSquares(**settings)
+    return pt.identify(data, "prandtl-ishlinskii", offset=offset, drift=drift, method=method)

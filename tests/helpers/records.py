@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,7 +13,7 @@ import piezotrack as pt
 from reference import DahlParameters
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -95,20 +95,54 @@ def quick(seed: int = 0) -> pt.Dataset:
     return pt.Dataset(u=u, y=x + noise, dt=1 / 250.0, source="quick.csv")
 
 
-def quick_fit(**arguments: Any) -> pt.identification.Identification:
-    """Search the paper's box on the quick record with a small swarm."""
-    wanted: dict[str, Any] = {
-        "model": "dahl",
+QUICK = pt.ParticleSwarm(particles=12, iterations=30)
+
+
+def entries(
+    *,
+    fixed: Mapping[str, Any] | None = None,
+    bounds: Mapping[str, Any] | None = None,
+    scales: Mapping[str, Any] | None = None,
+    ties: Mapping[str, Any] | None = None,
+    priors: Mapping[str, Any] | None = None,
+) -> dict[str, pt.Parameter]:
+    """Parameters of which one or several things are said, each in a mapping of its own."""
+    said: dict[str, dict[str, Any]] = {}
+    for what, mapping in (
+        ("prior", priors),
+        ("value", fixed),
+        ("bounds", bounds),
+        ("scale", scales),
+        ("tie", ties),
+    ):
+        for name, value in (mapping or {}).items():
+            said.setdefault(name, {})[what] = value
+    return {name: pt.Parameter(**values) for name, values in said.items()}
+
+
+def quick_fit(
+    data: pt.Dataset | None = None,
+    *,
+    fixed: Mapping[str, Any] = HELD,
+    bounds: Mapping[str, Any] = BOX,
+    swarm: pt.ParticleSwarm | None = QUICK,
+    seed: int = 1,
+    runs: int | None = None,
+    **arguments: Any,
+) -> pt.identification.Identification:
+    """Search the paper's box on the quick record with a small swarm; by descents without one."""
+    said = {name: arguments.pop(name, None) for name in ("scales", "ties", "priors")}
+    return pt.identify(
+        quick() if data is None else data,
+        arguments.pop("model", "dahl"),
         # As it was made: what came before is not what these searches are about.
-        "history": "virgin",
-        "fixed": HELD,
-        "bounds": BOX,
-        "swarm": pt.ParticleSwarm(particles=12, iterations=30),
-        "seed": 1,
-    }
-    wanted.update(arguments)
-    fit: pt.identification.Identification = pt.identify(wanted.pop("data", quick()), **wanted)
-    return fit
+        history=arguments.pop("history", "virgin"),
+        parameters=entries(fixed=fixed, bounds=bounds, **said),
+        method=pt.Descents(seed=seed, runs=runs or 1)
+        if swarm is None
+        else replace(swarm, seed=seed, runs=runs),
+        **arguments,
+    )
 
 
 def bits(fit: pt.identification.Identification) -> dict[str, Any]:

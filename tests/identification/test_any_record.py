@@ -210,7 +210,7 @@ def test_the_search_keeps_to_the_mode_that_the_record_shows() -> None:
     one = case(0, dahl, quick=True)
     short = pt.ParticleSwarm(particles=4, iterations=1, polish=False)
     fit = pt.identify(
-        one.log, "first-order-dahl", swarm=short, runs=1, history="virgin", progress=False
+        one.log, "first-order-dahl", method=replace(short, runs=1), history="virgin", progress=False
     )
     bounds = fit.parameters["mass"].bounds
     assert bounds is not None

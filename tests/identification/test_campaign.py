@@ -23,7 +23,7 @@ import piezotrack as pt
 from campaigns import PLAYS, QUICK, Serial, contents, flat, log, results
 from piezotrack.identification.campaigns import task as campaign_task
 from piezotrack.identification.campaigns.campaign import campaign
-from piezotrack.identification.campaigns.task import Task, settings
+from piezotrack.identification.campaigns.task import Task, problem_of
 
 
 def run(
@@ -51,8 +51,8 @@ def test_every_record_model_and_seed_is_identified_as_by_hand(tmp_path: Path) ->
     ]
     for one in found:
         record = log() if one.record == "stage 1.csv" else log(0.9)
-        own = QUICK if one.model == "quick" else {"model": PLAYS}
-        fit = pt.identify(record, seed=one.seed, **own)
+        seeded = {**QUICK, "method": replace(QUICK["method"], seed=one.seed or 0)}
+        fit = pt.identify(record, **(seeded if one.model == "quick" else {"model": PLAYS}))
         loaded = pt.load(one.file)
         assert loaded.model == one.fit.model == fit.model
         assert (loaded.offset, one.rms, one.notes) == (fit.offset, fit.cost, fit.notes)
@@ -74,7 +74,7 @@ def test_the_default_is_the_best_kind_in_threads(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_threads_change_no_bit(threads: int, tmp_path: Path) -> None:
-    models = {"quick": {**QUICK, "runs": 3}}
+    models = {"quick": {**QUICK, "method": replace(QUICK["method"], runs=3)}}
     run(tmp_path / "serial", [log(), log(0.9)], models, range(2))
     with ThreadPoolExecutor(threads) as pool:
         campaign([log(), log(0.9)], models, range(2), pool, folder=tmp_path / "threads")
@@ -139,7 +139,7 @@ def test_what_failed_once_is_replaced_when_it_works(
         raise MemoryError
 
     with monkeypatch.context() as patch:
-        patch.setattr(campaign_task, "identify", out_of_memory)
+        patch.setattr(campaign_task, "solve", out_of_memory)
         found, _ = run(tmp_path, [log()], {"quick": QUICK})
     assert found[0].error == "not enough memory"
     found, tasks = run(tmp_path, [log()], {"quick": QUICK})
@@ -214,7 +214,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 log()
 threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 try:
-    pt.campaign([log()], {"long": {**QUICK, "swarm": long}}, range(9), folder=tempfile.mkdtemp())
+    pt.campaign([log()], {"long": {**QUICK, "method": long}}, range(9), folder=tempfile.mkdtemp())
 except pt.Interrupted as error:
     print(error)
 """
@@ -251,18 +251,28 @@ def test_a_result_that_cannot_be_written_says_how_far_it_came(
 
 
 def name(record: pt.Dataset, seed: int | None = 0, **given: Any) -> str:
-    return Task(record=record, settings=settings("dahl", given), seed=seed).name
+    return task(record, seed, **given).name
+
+
+def task(record: pt.Dataset, seed: int | None = 0, **given: Any) -> Task:
+    problem, methods = problem_of("dahl", given, record)
+    return Task(problem=problem, methods=methods, seed=seed)
 
 
 def test_the_name_of_a_task_is_that_of_what_its_result_depends_on() -> None:
     record = log()
-    same = name(record, fixed={"a1": 120.0, "b1": 2e6}, runs=2)
+    two = pt.Descents(runs=2)
+    same = name(record, parameters={"a1": 120.0, "b1": 2e6}, method=two)
     assert re.fullmatch("[0-9a-f]{32}", same)
     # Neither the order of words, nor the kind of number, nor the threads.
-    assert same == name(record, runs=np.int64(2), fixed={"b1": 2_000_000, "a1": np.float64(120)})
-    task = Task(record=record, settings=settings("dahl", {}), seed=0)
-    assert task.name == replace(task, threads=7).name == pickle.loads(pickle.dumps(task)).name
-    assert name(record) == name(record, offset=True) == name(record, model="dahl", swarm=None)
+    assert same == name(
+        record,
+        method=pt.Descents(runs=np.int64(2)),  # type: ignore[arg-type]
+        parameters={"b1": 2_000_000, "a1": pt.Parameter(np.float64(120))},
+    )
+    one = task(record)
+    assert one.name == replace(one, threads=7).name == pickle.loads(pickle.dumps(one)).name
+    assert name(record) == name(record, offset=True) == name(record, model="dahl", method=None)
     other = pt.Dataset(u=record.u, y=record.y, dt=record.dt, hold="zoh")
     later = pt.Dataset(u=record.u, y=record.y, t=record.t + 1.0)
     swarm = pt.ParticleSwarm(iterations=201)
@@ -278,13 +288,13 @@ def test_the_name_of_a_task_is_that_of_what_its_result_depends_on() -> None:
         name(record, 2**60),
         name(record, 2**60 + 1),
         name(record, model="bouc-wen"),
-        name(record, swarm=pt.ParticleSwarm()),
-        name(record, swarm=swarm),
+        name(record, method=pt.ParticleSwarm()),
+        name(record, method=swarm),
         name(record, delay=True),
         name(record, delay=1),
         name(record, offset=False),
         name(record, history="virgin"),
-        replace(task, version="9.9").name,
+        replace(one, version="9.9").name,
     ]
     assert len(set(names)) == len(names)
 
@@ -292,21 +302,22 @@ def test_the_name_of_a_task_is_that_of_what_its_result_depends_on() -> None:
 def test_the_name_of_a_task_is_the_same_in_another_process() -> None:
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); from campaigns import *; "
-        "from piezotrack.identification.campaigns.task import Task, settings; "
-        "given = settings('dahl', {'free': {'mass', 'damping', 'a1', 'a2'}}); "
-        "print(Task(record=log(), settings=given, seed=3).name)"
+        "from piezotrack.identification.campaigns.task import Task, problem_of; "
+        "given = {'parameters': {'mass': 0.1828, 'a1': (10.0, 500.0)}}; "
+        "problem, methods = problem_of('dahl', given, log()); "
+        "print(Task(problem=problem, methods=methods, seed=3).name)"
     )
     helpers = str(Path(__file__).parents[1] / "helpers")
     done = subprocess.run(
         [sys.executable, "-c", code, helpers], capture_output=True, text=True, check=True
     )
-    assert done.stdout.strip() == name(log(), 3, free={"a2", "a1", "damping", "mass"})
+    assert done.stdout.strip() == name(log(), 3, parameters={"a1": (10.0, 500.0), "mass": 0.1828})
 
 
 def test_a_worker_of_another_version_is_refused() -> None:
-    task = Task(record=log(), settings=settings("dahl", {}), seed=0, version="9.9")
+    newer = replace(task(log()), version="9.9")
     with pytest.raises(pt.ExecutorError, match=r"a worker has piezotrack .*: expected 9\.9"):
-        campaign_task.run_task(task)
+        campaign_task.run_task(newer)
 
 
 # Bad input.
@@ -326,20 +337,22 @@ def test_a_worker_of_another_version_is_refused() -> None:
         (([log()], "dahl"), r"models is 'dahl': expected several in a list, as \['dahl'\]"),
         (([log()], []), "models is empty"),
         (([log()], ["dahl", "dahl"]), "models has 'dahl' twice"),
-        (([log()], [["dahl"]]), r"models has \['dahl'\]: expected names of kinds, or a mapping"),
+        (([log()], [["dahl"]]), r"models has \['dahl'\]: expected names of models, or a mapping"),
         (([log()], {"a": QUICK, "b": QUICK}), "models has the same settings as 'a' and as 'b'"),
         (([log()], ["dalh"]), "models: 'dalh': model is 'dalh': .*Did you mean 'dahl'"),
         (([log()], {"mine": {}}), "models: 'mine': model is 'mine': expected one of 'dahl'"),
         (([log()], {"mine": 3}), "models: 'mine' is 3: expected arguments of identify"),
-        (([log()], {"dahl": {"seed": 3}}), "models: 'dahl' has seed: expected it in seeds="),
+        (([log()], {"dahl": {"method": pt.Descents(seed=3)}}), "seed 3: expected it in seeds="),
         (([log()], {"dahl": {"threads": 3}}), "'dahl' has threads: expected none, as the exec"),
-        (([log()], {"dahl": {"run": 3}}), "'dahl' has 'run': expected 'model', 'offset'"),
-        (([log()], {"dahl": {"runs": -3}}), "'dahl': runs is -3: expected"),
-        (([log()], {"dahl": {"swarm": 3}}), "'dahl': swarm is 3: expected ParticleSwarm"),
+        (([log()], {"dahl": {"run": 3}}), "'dahl' has 'run': expected 'model', 'parameters'"),
+        (([log()], {"dahl": {"method": 3}}), "'dahl': method is 3: expected 'descents'"),
         (([log()], {"dahl": {"delay": log}}), "'dahl': delay is <.*: expected a number"),
         (([log()], {"dahl": {"drift": "yes"}}), "'dahl': drift is 'yes': expected a number"),
-        (([log()], {PLAYS: {"fixed": {"a1": 1}}}), "fixed is .*: expected none with the model"),
-        (([log()], {"auto": {"free": ["mass"]}}), "free is given with model='auto'"),
+        (
+            ([log()], {PLAYS: {"parameters": {"a1": 1}}}),
+            "parameters is .*: expected none with the model",
+        ),
+        (([log()], {"auto": {"parameters": {"mass": 1}}}), "none with model='auto'"),
         (([log()], ["dahl"], 3), r"seeds is 3: expected several in a list, as \[0, 1\] or range"),
         (([log()], ["dahl"], []), "seeds is empty"),
         (([log()], ["dahl"], [1, 1]), "seeds has 1 twice"),
@@ -370,7 +383,7 @@ def test_a_folder_with_other_files_is_left_alone(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"schema_version": 2}, "has schema_version 2: this version of piezotrack reads 1"),
+        ({"schema_version": 3}, "has schema_version 3: this version of piezotrack reads 2"),
         ({"format": "piezotrack-model"}, "its 'format' is not 'piezotrack-campaign'"),
         ({"records": 3}, "an entry is not of the form that is written"),
     ],
@@ -393,15 +406,20 @@ def test_the_folder_of_another_campaign_is_left_alone(tmp_path: Path) -> None:
     with pytest.raises(pt.DataError, match=r"another campaign, of the records 'stage 1\.csv', non"):
         run(tmp_path, [log(0.9)], {"quick": QUICK})
     with pytest.raises(pt.DataError, match=r"has the model 'quick' with other settings, \{'mo"):
-        run(tmp_path, [log()], {"quick": {**QUICK, "runs": 2}})
+        run(tmp_path, [log()], {"quick": {**QUICK, "delay": True}})
     assert contents(tmp_path) == before
     # A title under which nothing was found yet may be put right.
-    wrong = run(tmp_path, [log()], {"new": {**QUICK, "free": ["nope"]}})[0]
+    wrong = run(tmp_path, [log()], {"new": {**QUICK, "parameters": {"nope": 1.0}}})[0]
     assert "nope" in str(wrong[0].error)
-    assert run(tmp_path, [log()], {"new": {**QUICK, "runs": 3}})[0].failed == ()
+    assert (
+        run(tmp_path, [log()], {"new": {**QUICK, "method": replace(QUICK["method"], runs=3)}})[
+            0
+        ].failed
+        == ()
+    )
     assert len(pt.identification.Campaign.load(tmp_path)) == 3
     # Settings with an infinity, which JSON does not have, are the same when they are read.
-    swarm = {**QUICK, "swarm": replace(QUICK["swarm"], velocity_limit=np.inf)}
+    swarm = {**QUICK, "method": replace(QUICK["method"], velocity_limit=np.inf)}
     for tasks in (1, 0):
         assert run(tmp_path, [log()], {"free": swarm})[1] == tasks
 

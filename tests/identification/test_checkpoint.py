@@ -54,8 +54,12 @@ def interrupted(path: Path, after: int, log: pt.Dataset | None = None, **setting
     "settings",
     [
         {"model": "dahl"},
-        {"model": "dahl", "creep": (0.1, 1.0), "priors": {"stiffness": (2.6e4, 1e3)}},
-        {"model": "bouc-wen", "method": "swarm", "runs": 2},
+        {
+            "model": "dahl",
+            "creep": (0.1, 1.0),
+            "parameters": {"stiffness": pt.Parameter(prior=(2.6e4, 1e3))},
+        },
+        {"model": "bouc-wen", "method": pt.ParticleSwarm(runs=2)},
         {"model": "first-order-dahl", "delay": True, "history": "fit"},
         {"model": "auto"},
     ],
@@ -80,7 +84,7 @@ def test_a_search_goes_on_to_the_same_bits(settings: dict[str, Any], tmp_path: P
 
 @pytest.mark.slow
 def test_fifty_interruptions_change_nothing(tmp_path: Path) -> None:
-    settings: dict[str, Any] = {"model": "dahl", "method": "swarm", "runs": 2}
+    settings: dict[str, Any] = {"model": "dahl", "method": pt.ParticleSwarm(runs=2)}
     expected = found(pt.identify(record(), **settings))
     path = tmp_path / "search.checkpoint"
     draws, after = random.Random(1), 0
@@ -96,9 +100,8 @@ SEARCH = """
     import piezotrack as pt
     u, y = np.load(sys.argv[1])
     print("begun", flush=True)
-    fit = pt.identify(
-        pt.Dataset(u=u, y=y, dt=1e-3), "bouc-wen", method="swarm", runs=3, checkpoint=sys.argv[2]
-    )
+    log, swarm = pt.Dataset(u=u, y=y, dt=1e-3), pt.ParticleSwarm(runs=3)
+    fit = pt.identify(log, "bouc-wen", method=swarm, checkpoint=sys.argv[2])
     print(repr((fit.cost, fit.parameters, fit.nfev, fit.history.tolist())))
 """
 
@@ -152,7 +155,11 @@ def test_a_checkpoint_of_another_search_is_refused_and_kept(tmp_path: Path) -> N
     path = tmp_path / "search.checkpoint"
     assert interrupted(path, 5, model="dahl")
     content = path.read_bytes()
-    others: list[dict[str, Any]] = [{"seed": 2}, {"offset": False}, {"fixed": {"mass": 0.1}}]
+    others: list[dict[str, Any]] = [
+        {"method": pt.Descents(seed=2)},
+        {"offset": False},
+        {"parameters": {"mass": 0.1}},
+    ]
     for other in others:
         with pytest.raises(pt.DataError, match=r"search\.checkpoint is that of another search"):
             pt.identify(record(), "dahl", checkpoint=path, **other)

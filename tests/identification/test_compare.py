@@ -54,7 +54,7 @@ def row(name: str, of: pt.identification.Comparison | None = None) -> pt.identif
 
 def test_a_model_is_what_identify_finds_on_the_fitted_part() -> None:
     one = row("bouc-wen")
-    alone = pt.identify(log()[1.0:5.0], "bouc-wen", seed=1, runs=1)
+    alone = pt.identify(log()[1.0:5.0], "bouc-wen", method=pt.Descents(seed=1))
     assert one.fit.document() == alone.document()
     assert one.train.rms == pytest.approx(alone.cost, rel=1e-9)
     assert one.title == "Bouc-Wen"

@@ -44,12 +44,11 @@ def found(
     return pt.identify(
         record(offset=3e-6 if offset else 0.0),
         "first-order-dahl",
-        fixed=HELD,
+        parameters=HELD,
         creep=creep,
         offset=offset,
         delay=delay,
-        runs=1,
-        swarm=pt.ParticleSwarm(iterations=20, particles=16),
+        method=pt.ParticleSwarm(iterations=20, particles=16, runs=1),
     )
 
 
@@ -96,17 +95,17 @@ def test_the_weights_are_those_of_linear_least_squares() -> None:
 def test_the_weights_stay_below_a_half() -> None:
     # All of the motion is delayed: what no creep is.
     slow = replace(STAGE, creep_weights=(2.0,), creep_times=(1.0,))
+    swarm = pt.ParticleSwarm(iterations=20, particles=16, runs=1)
     fit = pt.identify(
-        record(slow), "first-order-dahl", fixed=HELD, creep=[0.5, 1.0], runs=1,
-        swarm=pt.ParticleSwarm(iterations=20, particles=16),
-    )  # fmt: skip
+        record(slow), "first-order-dahl", parameters=HELD, creep=[0.5, 1.0], method=swarm
+    )
     assert min(fit.model.creep_weights) >= 0.0
     assert sum(fit.model.creep_weights) == pytest.approx(0.5, abs=1e-9)
 
 
 def test_time_constants_from_the_record() -> None:
-    swarm = pt.ParticleSwarm(iterations=1, particles=4, polish=False)
-    options: dict[str, Any] = {"fixed": HELD, "runs": 1, "swarm": swarm, "creep": True}
+    swarm = pt.ParticleSwarm(iterations=1, particles=4, polish=False, runs=1)
+    options: dict[str, Any] = {"parameters": HELD, "method": swarm, "creep": True}
     fit = pt.identify(record(), "first-order-dahl", **options)
     assert fit.model.creep_times == pytest.approx((2.0, 7.5), rel=0.1)
     short = pt.Dataset(u=record().u[:399], y=record().y[:399], dt=DT)
@@ -129,15 +128,17 @@ def two_records(noise: float = 0.0) -> list[pt.Dataset]:
     ]
 
 
-def together(records: list[pt.Dataset], **asked: Any) -> pt.identification.Identification:
+def together(
+    records: list[pt.Dataset] | list[pt.Record], **asked: Any
+) -> pt.identification.Identification:
     asked = {"creep": (0.3, 4.0), "history": "virgin", "progress": False, **asked}
-    return pt.identify(records, "first-order-dahl", fixed=HELD, **asked)
+    return pt.identify(records, "first-order-dahl", parameters=HELD, **asked)
 
 
 @pytest.mark.parametrize("method", ["descents", "swarm"])
 def test_several_records_have_the_same_weights(method: Any) -> None:
-    swarm = pt.ParticleSwarm(iterations=20, particles=16) if method == "swarm" else None
-    fit = together(two_records(), method=method, swarm=swarm)
+    swarm = pt.ParticleSwarm(iterations=20, particles=16)
+    fit = together(two_records(), method=swarm if method == "swarm" else method)
     assert fit.model.creep_weights == pytest.approx((0.02, 0.03), rel=2e-3)
     assert fit.model.damping == pytest.approx(500.0, rel=1e-2)
     assert [one.offset for one in fit.records] == pytest.approx([3e-6, -1e-6], abs=1e-9)
@@ -153,9 +154,13 @@ def test_the_weights_are_those_of_least_squares_of_all_records(
     """Of the mechanics that were found: by the active set method of SciPy, on stacked columns."""
     nnls = pytest.importorskip("scipy.optimize").nnls
     records = two_records(noise=1e-7)
-    fit = together(records, offset=offset, weights=weights)
-    alone = replace(fit.model, creep_weights=(), creep_times=())
     offsets = offset if isinstance(offset, list) else [offset] * 2
+    own = [
+        pt.Record(data, offset=fitted, weight=weight, history="virgin")
+        for data, fitted, weight in zip(records, offsets, weights, strict=True)
+    ]
+    fit = together(own, history=None)
+    alone = replace(fit.model, creep_weights=(), creep_times=())
     rows, measured = [], []
     for i, (data, weight) in enumerate(zip(records, weights, strict=True)):
         x = alone.simulate(data.u, data.dt).x
@@ -186,13 +191,18 @@ def test_the_search_of_several_records_ends_at_a_minimum() -> None:
         for change in (0.98, 1.02):
             held = {**HELD, name: change * value}
             beside = pt.identify(
-                records, "first-order-dahl", fixed=held, creep=(0.3, 4.0), history="virgin"
+                records, "first-order-dahl", parameters=held, creep=(0.3, 4.0), history="virgin"
             )
             assert beside.cost > fit.cost
 
 
 def test_the_cost_of_several_records_is_that_of_the_stage() -> None:
-    fit = together(two_records(noise=1e-7), weights=(1.0, 3.0), delay=[0.0, 1e-3])
+    first, second = two_records(noise=1e-7)
+    records = [
+        pt.Record(first, history="virgin"),
+        pt.Record(second, history="virgin", weight=3.0, delay=1e-3),
+    ]
+    fit = together(records, history=None)
     for one, score in zip(fit.records, fit.scores, strict=True):
         assert score.rms == pytest.approx(one.cost, abs=2e-10)
     counts = np.array([1.0, 3.0]) * [len(data) for data in two_records()]
@@ -205,9 +215,10 @@ def test_the_cost_of_several_records_is_that_of_the_stage() -> None:
 def test_candidates_that_diverge_are_no_best_ones(method: Any) -> None:
     """Measured records, on which the bounds hold stages that do not stay finite."""
     records = [pt.datasets.dbo_training()[3.0:], pt.datasets.dbo_tracking()[3.0:]]
-    asked: dict[str, Any] = {"history": "virgin", "progress": False, "seed": 1}
-    fit = pt.identify(records, "first-order-dahl", creep=True, method=method, **asked)
-    without = pt.identify(records, "first-order-dahl", method=method, **asked)
+    asked: dict[str, Any] = {"history": "virgin", "progress": False}
+    seeded = pt.ParticleSwarm(seed=1) if method == "swarm" else pt.Descents(seed=1)
+    fit = pt.identify(records, "first-order-dahl", creep=True, method=seeded, **asked)
+    without = pt.identify(records, "first-order-dahl", method=seeded, **asked)
     assert 0.5 * without.cost < fit.cost <= without.cost
     assert [one.rms for one in fit.scores] == pytest.approx(
         [one.cost for one in fit.records], rel=1e-3
@@ -215,8 +226,8 @@ def test_candidates_that_diverge_are_no_best_ones(method: Any) -> None:
 
 
 def test_time_constants_from_several_records() -> None:
-    swarm = pt.ParticleSwarm(iterations=1, particles=4, polish=False)
-    options: dict[str, Any] = {"creep": True, "swarm": swarm, "runs": 1}
+    swarm = pt.ParticleSwarm(iterations=1, particles=4, polish=False, runs=1)
+    options: dict[str, Any] = {"creep": True, "method": swarm}
     fit = together(two_records(), **options)
     # The period of the quick one, and half of the window of the slow one.
     assert fit.model.creep_times == pytest.approx((0.2, 7.5), rel=0.1)
@@ -242,8 +253,8 @@ def test_refuses(creep: Any, message: str) -> None:
 def test_of_models_found_by_least_squares_it_is_a_setting() -> None:
     with pytest.raises(pt.ParameterError, match="creep is True: expected none with the model"):
         pt.identify(record(), "prandtl-ishlinskii", creep=True)
-    with pytest.raises(pt.ParameterError, match="fixed is 'creep_weights': expected one of mass"):
-        pt.identify(record(), "first-order-dahl", fixed={"creep_weights": 0.1})
+    with pytest.raises(pt.ParameterError, match="'creep_weights': expected one of mass"):
+        pt.identify(record(), "first-order-dahl", parameters={"creep_weights": 0.1})
 
 
 def test_a_model_file_keeps_it_and_older_ones_have_none(tmp_path: Path) -> None:

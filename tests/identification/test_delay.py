@@ -37,7 +37,7 @@ def test_a_delay_is_found(delay: float) -> None:
     u, y = late(delay)
     noise = 10e-9 * np.random.default_rng(2).standard_normal(y.size)
     data = pt.Dataset(u=u, y=y + noise, dt=DT)
-    fit = pt.identify(data, "dahl", fixed=HELD, delay=True, seed=1, runs=2)
+    fit = pt.identify(data, "dahl", parameters=HELD, delay=True, method=pt.Descents(seed=1, runs=2))
     assert fit.cost < 10.5e-9
     assert fit.delay == pytest.approx(delay, abs=5e-6)
     assert fit.model.damping == pytest.approx(2597.3, rel=2e-3)
@@ -50,13 +50,15 @@ def test_a_delay_is_found(delay: float) -> None:
 def test_a_known_delay_is_used_and_bounds_are_kept() -> None:
     u, y = late(3.45e-3)
     data = pt.Dataset(u=u, y=y, dt=DT)
-    known = pt.identify(data, "dahl", fixed=HELD, delay=3.45e-3, seed=1, runs=1)
-    none = pt.identify(data, "dahl", fixed=HELD, seed=1, runs=1)
+    known = pt.identify(data, "dahl", parameters=HELD, delay=3.45e-3, method=pt.Descents(seed=1))
+    none = pt.identify(data, "dahl", parameters=HELD, method=pt.Descents(seed=1))
     assert known.delay == 3.45e-3
     assert known.cost < 2e-9 < 10 * known.cost < none.cost
     assert not known.parameters["delay"].free
     assert "delay" not in none.parameters
-    bound = pt.identify(data, "dahl", fixed=HELD, delay=(0.0, 2e-3), seed=1, runs=1)
+    bound = pt.identify(
+        data, "dahl", parameters=HELD, delay=(0.0, 2e-3), method=pt.Descents(seed=1)
+    )
     assert bound.delay == pytest.approx(2e-3)
     assert bound.parameters["delay"].at_bound
     assert not bound.parameters["delay"].identified
@@ -66,7 +68,7 @@ def test_a_known_delay_is_used_and_bounds_are_kept() -> None:
 def test_the_delay_is_in_the_file_and_in_what_the_model_shows(tmp_path: Path) -> None:
     u, y = late(3.45e-3)
     data = pt.Dataset(u=u, y=y, dt=DT)
-    fit = pt.identify(data, "dahl", fixed=HELD, delay=True, seed=1, runs=1)
+    fit = pt.identify(data, "dahl", parameters=HELD, delay=True, method=pt.Descents(seed=1))
     path = fit.save(tmp_path / "dahl.json")
     entry = json.loads(path.read_text())["delay"]
     assert entry["value"] == fit.delay
@@ -84,7 +86,9 @@ def test_the_delay_is_in_the_file_and_in_what_the_model_shows(tmp_path: Path) ->
 
 def test_a_file_without_a_delay_is_read(tmp_path: Path) -> None:
     u, y = late(0.0)
-    fit = pt.identify(pt.Dataset(u=u, y=y, dt=DT), "dahl", fixed=HELD, seed=1, runs=1)
+    fit = pt.identify(
+        pt.Dataset(u=u, y=y, dt=DT), "dahl", parameters=HELD, method=pt.Descents(seed=1)
+    )
     document = json.loads(fit.save(tmp_path / "dahl.json").read_text())
     del document["delay"]
     document["schema_version"] = 1

@@ -41,7 +41,7 @@ def record(
 
 
 def found(data: Any, **given: Any) -> pt.identification.Identification:
-    asked: dict[str, Any] = {"fixed": HELD, "history": "virgin", "drift": True}
+    asked: dict[str, Any] = {"parameters": HELD, "history": "virgin", "drift": True}
     return pt.identify(data, "dahl", **asked | given)
 
 
@@ -89,7 +89,7 @@ def test_the_cost_is_that_of_linear_least_squares(creep: Any) -> None:
     stage = replace(STAGE, creep_weights=(0.02, 0.03), creep_times=(0.4, 6.0)) if creep else STAGE
     data = record(drift=(6e-7, 12.0), stage=stage)
     asked = pt.identification.Objective(
-        data, "dahl", fixed=HELD, drift=True, history="virgin", creep=creep
+        data, "dahl", parameters=HELD, drift=True, history="virgin", creep=creep
     )
     assert list(asked.ranges)[-1] == "drift_time"
     draws, count = np.random.default_rng(5), len(asked.ranges)
@@ -128,7 +128,7 @@ def test_the_search_ends_at_the_best_time_constant() -> None:
     known = found(fit.data, drift=12.0)
     assert known.cost == pytest.approx(fit.cost, rel=1e-4)
     # A swarm finds the same.
-    swarm = found(fit.data, swarm=pt.ParticleSwarm(iterations=60, particles=24))
+    swarm = found(fit.data, method=pt.ParticleSwarm(iterations=60, particles=24))
     assert swarm.cost == pytest.approx(fit.cost, rel=1e-6)
 
 
@@ -136,7 +136,12 @@ def test_each_record_has_a_drift_of_its_own() -> None:
     fades = record(drift=(6e-7, 12.0))
     rises = record(drift=(-3e-7, 6.0), seconds=30.0, offset=-4e-7, seed=4)
     still = record(seed=5, seconds=30.0)
-    fit = found([fades, rises, still], drift=[True, 6.0, False])
+    records = [
+        pt.Record(fades, drift=True, history="virgin"),
+        pt.Record(rises, drift=6.0, history="virgin"),
+        pt.Record(still, drift=False, history="virgin"),
+    ]
+    fit = pt.identify(records, "dahl", parameters=HELD)
     first, second, third = fit.records
     assert first.drift is not None
     assert second.drift is not None

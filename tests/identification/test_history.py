@@ -1,5 +1,6 @@
 """Where a record begins: in equilibrium, after a history that is given or shown by the record."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.identification.solve.search import search_records
+from piezotrack.identification.solve.search import search_parameters
 
 DT = 1e-3
 NOISE = 10e-9
@@ -33,7 +34,7 @@ def record(visited: list[float], seed: int = 0, amplitude: float = 35.0) -> pt.D
 
 def fitted(log: pt.Dataset, **settings: Any) -> pt.identification.Identification:
     return pt.identify(
-        log, "first-order-dahl", swarm=QUICK, runs=2, seed=1, progress=False, **settings
+        log, "first-order-dahl", method=replace(QUICK, seed=1, runs=2), progress=False, **settings
     )
 
 
@@ -86,11 +87,11 @@ def test_a_record_is_searched_again_only_for_a_history_that_it_shows(
 ) -> None:
     asked = []
 
-    def search(records: Any, *arguments: Any, **settings: Any) -> Any:
-        asked.append(records[0].history)
-        return search_records(records, *arguments, **settings)
+    def search(problem: Any, *arguments: Any) -> Any:
+        asked.append(problem.records[0].history)
+        return search_parameters(problem, *arguments)
 
-    monkeypatch.setattr("piezotrack.identification.solve.one_model.search_records", search)
+    monkeypatch.setattr("piezotrack.identification.solve.one_model.search_parameters", search)
     pt.identify(record(visited), "first-order-dahl")
     assert set(asked) <= set(searched)
     assert asked[-1] == searched[-1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,12 +63,9 @@ def test_the_papers_search_finds_what_scipy_simulated(drive: str, seed: int) -> 
     fit = pt.identify(
         noisy(drive),
         "dahl",
-        free=list(BOX),
-        fixed=HELD,
-        bounds=BOX,
+        parameters={**BOX, **HELD},
         offset=False,
-        swarm=pt.ParticleSwarm.xu_li_2010(),
-        seed=seed,
+        method=pt.ParticleSwarm.xu_li_2010(seed=seed),
     )
     assert max(off(fit).values()) < 0.01, off(fit)
     assert fit.cost == min(run.cost for run in fit.runs)
@@ -94,14 +91,20 @@ def test_spso_2011_finds_it_and_the_descent_sharpens_it(update: Any, seed: int) 
 @pytest.mark.parametrize("drive", ["slow sine", "two tones"])
 @pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3))])
 def test_the_default_search_finds_it_from_any_seed(drive: str, seed: int) -> None:
-    fit = pt.identify(noisy(drive), "dahl", fixed=HELD, bounds=BOX, offset=False, seed=seed)
+    fit = pt.identify(
+        noisy(drive),
+        "dahl",
+        parameters={**BOX, **HELD},
+        offset=False,
+        method=pt.Descents(seed=seed),
+    )
     assert max(off(fit).values()) < 0.001, off(fit)
     assert fit.cost == pytest.approx(NOISE, rel=0.02)
 
 
 def test_the_cost_is_that_of_a_converged_simulation() -> None:
     # A search steps as coarsely as it may; that must not show in what it reports.
-    fit = pt.identify(noisy("two tones"), "dahl", seed=1, runs=1)
+    fit = pt.identify(noisy("two tones"), "dahl", method=pt.Descents(seed=1))
     assert fit.fitted.rms == pytest.approx(fit.cost, abs=2e-10)
     assert fit.fitted.offset == fit.offset
 
@@ -109,23 +112,31 @@ def test_the_cost_is_that_of_a_converged_simulation() -> None:
 def test_an_offset_of_the_sensor_is_found() -> None:
     log = noisy("slow sine")
     moved = pt.Dataset(u=log.u, y=log.y + 3e-6, dt=log.dt)
-    fit = pt.identify(moved, "dahl", fixed=HELD, bounds=BOX, seed=1, runs=1)
+    fit = pt.identify(moved, "dahl", parameters={**BOX, **HELD}, method=pt.Descents(seed=1))
     assert fit.offset_fitted
     assert fit.offset == pytest.approx(3e-6, abs=5e-9)
     assert max(off(fit).values()) < 0.001
-    straight = pt.identify(log, "dahl", fixed=HELD, bounds=BOX, seed=1, runs=1)
+    straight = pt.identify(log, "dahl", parameters={**BOX, **HELD}, method=pt.Descents(seed=1))
     # The refinement ends within a twentieth of the offset's standard deviation.
     close = 0.05 * fit.cost / np.sqrt(len(log))
     assert fit.offset - straight.offset == pytest.approx(3e-6, abs=close)
     assert straight.offset == pytest.approx(0.0, abs=5e-9)
     # Without it the parameters have to bend, and the cost shows it.
-    bent = pt.identify(moved, "dahl", fixed=HELD, bounds=BOX, seed=1, runs=1, offset=False)
+    bent = pt.identify(
+        moved, "dahl", parameters={**BOX, **HELD}, method=pt.Descents(seed=1), offset=False
+    )
     assert bent.offset == 0.0
     assert bent.cost > 1.5 * fit.cost
 
 
 def test_the_mass_has_no_trace_in_a_slow_record() -> None:
-    fit = pt.identify(noisy("slow sine"), "dahl", fixed=HELD, bounds=BOX, offset=False, seed=1)
+    fit = pt.identify(
+        noisy("slow sine"),
+        "dahl",
+        parameters={**BOX, **HELD},
+        offset=False,
+        method=pt.Descents(seed=1),
+    )
     assert not fit.parameters["mass"].identified
     assert all(fit.parameters[name].identified for name in NAMES if name != "mass")
     assert "Not determined by this record: mass." in fit.summary()
@@ -149,14 +160,17 @@ def test_standard_deviations_tell_the_spread() -> None:
 
 def test_without_a_force_the_scale_is_assumed() -> None:
     held = {"a1": TABLE_1.a1, "a2": TABLE_1.a2}
-    assumed = pt.identify(noisy("slow sine"), "dahl", fixed=held, seed=1, runs=1)
+    assumed = pt.identify(noisy("slow sine"), "dahl", parameters=held, method=pt.Descents(seed=1))
     assert assumed.scale_assumed
     assert assumed.model.stiffness == 1e6
     assert "scale assumed" in assumed.summary()
     assert max(off(assumed).values()) < 0.002
 
     known = pt.identify(
-        noisy("slow sine"), "dahl", fixed=held, stiffness=TABLE_1.stiffness, seed=1, runs=1
+        noisy("slow sine"),
+        "dahl",
+        parameters={**held, "stiffness": TABLE_1.stiffness},
+        method=pt.Descents(seed=1),
     )
     assert not known.scale_assumed
     assert "scale assumed" not in known.summary()
@@ -176,7 +190,7 @@ def test_without_a_force_the_scale_is_assumed() -> None:
 @pytest.mark.parametrize("name", ["mass", "damping", "piezo_coefficient", "b1"])
 def test_any_parameter_that_carries_force_fixes_the_scale(name: str) -> None:
     held = {"a1": TABLE_1.a1, "a2": TABLE_1.a2, name: getattr(TABLE_1, name)}
-    fit = pt.identify(quick(), "dahl", fixed=held, seed=1, runs=1)
+    fit = pt.identify(quick(), "dahl", parameters=held, method=pt.Descents(seed=1))
     assert not fit.scale_assumed
     assert getattr(fit.model, name) == getattr(TABLE_1, name)
     assert max(off(fit).values()) < 0.005
@@ -211,7 +225,9 @@ def test_the_drive_before_the_window_is_remembered() -> None:
     log = pt.Dataset(u=u, y=run.x + np.random.default_rng(7).normal(0.0, 5e-8, t.size), dt=1 / rate)
 
     def wrong(data: pt.Dataset) -> tuple[pt.identification.Identification, float]:
-        fit = pt.identify(data, "dahl", stiffness=1e5, fixed={"mass": 0.25}, seed=1)
+        fit = pt.identify(
+            data, "dahl", parameters={"mass": 0.25, "stiffness": 1e5}, method=pt.Descents(seed=1)
+        )
         names = ("damping", "piezo_coefficient", "a1", "a2", "b1")
         return fit, max(abs(getattr(fit.model, n) / getattr(stage, n) - 1.0) for n in names)
 
@@ -248,7 +264,10 @@ def test_same_seed_same_bits_for_any_number_of_threads(name: str, runs: int) -> 
 
 
 def test_same_seed_same_bits_where_everything_is_free() -> None:
-    fits = [pt.identify(quick(), "dahl", seed=3, threads=threads) for threads in (1, 2, 7)]
+    fits = [
+        pt.identify(quick(), "dahl", method=pt.Descents(seed=3), threads=threads)
+        for threads in (1, 2, 7)
+    ]
     assert bits(fits[0]) == bits(fits[1]) == bits(fits[2])
 
 
@@ -317,10 +336,14 @@ def test_one_failing_simulation_does_not_end_the_search() -> None:
     fit = pt.identify(
         quick(),
         "dahl",
-        fixed={"mass": TABLE_1.mass, "a1": TABLE_1.a1, "a2": TABLE_1.a2},
-        stiffness=TABLE_1.stiffness,
-        bounds={"b1": (-1e8, 1e7)},
-        seed=1,
+        parameters={
+            "b1": (-1e8, 1e7),
+            "mass": TABLE_1.mass,
+            "a1": TABLE_1.a1,
+            "a2": TABLE_1.a2,
+            "stiffness": TABLE_1.stiffness,
+        },
+        method=pt.Descents(seed=1),
     )
     assert 0 < fit.nfail < fit.nfev
     assert fit.cost == pytest.approx(NOISE, rel=0.1)
@@ -332,13 +355,15 @@ def test_where_every_simulation_fails_the_message_says_what_to_look_at() -> None
     held = {"mass": TABLE_1.mass, "a1": TABLE_1.a1, "a2": TABLE_1.a2}
     with pytest.raises(pt.NumericalError, match=r"not one of \d+ simulations .* bounds and units"):
         pt.identify(
-            quick(), "dahl", fixed=held, stiffness=TABLE_1.stiffness, bounds={"b1": (-1e12, -1e11)}
+            quick(),
+            "dahl",
+            parameters={"b1": (-1e12, -1e11), **held, "stiffness": TABLE_1.stiffness},
         )
 
 
 def test_the_published_settings() -> None:
     # Section 3.3 of the paper; min_improvement's unit is ours.
-    assert asdict(pt.ParticleSwarm.xu_li_2010()) | {
+    assert pt.ParticleSwarm.xu_li_2010().settings() | {
         "velocity_limit": None,
         "boundary": None,
     } == {
@@ -378,7 +403,7 @@ def test_no_velocity_limit_is_a_setting() -> None:
 def test_counts_may_be_numpys(tmp_path: Path) -> None:
     # They come from arange and from random generators.
     counts: dict[str, Any] = {"particles": np.int64(12), "iterations": np.int32(30)}
-    fit = quick_fit(seed=np.int64(1), swarm=pt.ParticleSwarm(**counts))
+    fit = quick_fit(seed=np.int64(1), swarm=pt.ParticleSwarm(**counts))  # type: ignore[arg-type]
     assert bits(fit) == bits(quick_fit())
     assert pt.load(fit.save(tmp_path / "dahl.json")).model == fit.model
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,7 @@ def fitted(phase: np.ndarray, swarm: pt.ParticleSwarm) -> pt.identification.Iden
     u = 37.5 * (1.0 - np.cos(phase))
     noise = 5e-9 * np.random.default_rng(1).standard_normal(u.size)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, DT).x + noise, dt=DT)
-    return pt.identify(log, "first-order-dahl", swarm=swarm, runs=1, history="virgin")
+    return pt.identify(log, "first-order-dahl", method=replace(swarm, runs=1), history="virgin")
 
 
 @pytest.mark.parametrize("periods", [3, 6, 20])

@@ -10,6 +10,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack import _core
+from piezotrack.identification.problem.problem import Problem
 from play_records import PLAIN, STAGE, drive, record
 
 if TYPE_CHECKING:
@@ -19,23 +20,21 @@ MODE = replace(PLAIN, frequency=160.0, damping_ratio=0.03)
 DT = 1e-3
 
 
-def fitted(u: NDArray[np.float64], y: NDArray[np.float64], **given: Any) -> Any:
+def fitted(
+    u: NDArray[np.float64],
+    y: NDArray[np.float64],
+    *,
+    dt: float = DT,
+    start: int = 0,
+    history: Any = None,
+    drift: bool | None = False,
+    model: str = "prandtl-ishlinskii",
+    **given: Any,
+) -> Any:
     """A fit of one record through the core; what is not given is chosen."""
-    asked: dict[str, Any] = {
-        "u": u,
-        "y": y,
-        "dt": DT,
-        "hold_name": "foh",
-        "start": 0,
-        "history": None,
-        "offset": True,
-        "drift": 0.0,
-        "delay": (0.0, 0.0),
-        "label": "",
-        "weight": 1.0,
-    }
+    data = pt.Dataset(u=u, y=y, dt=dt)
+    one = pt.Record(data[float(data.t[start]) :], history=history, drift=drift)
     settings: dict[str, Any] = {
-        "model": "prandtl-ishlinskii",
         "count": None,
         "thresholds": list(PLAIN.thresholds),
         "zones": 0,
@@ -43,9 +42,7 @@ def fitted(u: NDArray[np.float64], y: NDArray[np.float64], **given: Any) -> Any:
         "dynamics": "none",
         "threads": 0,
     }
-    for name, value in given.items():
-        (asked if name in asked else settings)[name] = value
-    return _core.identify_weights([asked], **settings)
+    return _core.identify_weights(Problem(model=model, records=(one,)), **settings | given)
 
 
 def number(fit: Any, name: str) -> float:
@@ -117,7 +114,7 @@ def test_choices_on_a_thinned_record_are_those_of_the_whole() -> None:
         u = 37.5 - 30.0 * np.cos(2.0 * np.pi * 1.3 * t)
         start = stage.equilibrium([70.0, float(u[0])])
         y = noisy(stage.simulate(u, t[1], initial=start).x)
-        free = {"thresholds": None, "creep_times": None, "dynamics": "auto"}
+        free: dict[str, Any] = {"thresholds": None, "creep_times": None, "dynamics": "auto"}
         return fitted(u, y, dt=t[1], **free)
 
     few, many = fit(short), fit(long)

@@ -43,7 +43,7 @@ def tracking() -> pt.Dataset:
 
 @cache
 def fit(seed: int) -> pt.identification.Identification:
-    return pt.identify(training(), "dahl", seed=seed)
+    return pt.identify(training(), "dahl", method=pt.Descents(seed=seed))
 
 
 def test_the_figures_of_the_readme() -> None:
@@ -99,7 +99,7 @@ def test_it_says_what_it_does_not_know() -> None:
 
 def test_the_papers_swarm_does_better_than_a_straight_line() -> None:
     # A line leaves 7.4 % on this record and 5.6 % on the other.
-    found = pt.identify(training(), "dahl", swarm=pt.ParticleSwarm.xu_li_2010(), seed=1)
+    found = pt.identify(training(), "dahl", method=pt.ParticleSwarm.xu_li_2010(seed=1))
     assert found.npolish == 0
     assert found.cost_percent < 2.0
     assert found.score(tracking()).rms_percent < 2.5
@@ -107,5 +107,7 @@ def test_the_papers_swarm_does_better_than_a_straight_line() -> None:
 
 def test_the_warm_up_counts() -> None:
     # What the stage remembers at 3 s is in the drive before.
-    forgetting = pt.identify(datasets.dbo_training().cut(3.0, 23.0), "dahl", seed=1)
+    forgetting = pt.identify(
+        datasets.dbo_training().cut(3.0, 23.0), "dahl", method=pt.Descents(seed=1)
+    )
     assert forgetting.cost > 1.1 * fit(1).cost

@@ -204,7 +204,7 @@ def test_the_file_says_where_the_numbers_come_from(tmp_path: Path) -> None:
     assert provenance["seed"] == 1
     swarm = fitted().swarm
     assert swarm is not None
-    assert provenance["swarm"] == asdict(swarm)
+    assert provenance["swarm"] == swarm.settings()
     data = provenance["data"]
     # The hash as the documentation has it: dt, the drive and displacement kept, the warm-up.
     kept = quick()[:3.0]
@@ -221,8 +221,7 @@ def test_the_file_says_where_the_numbers_come_from(tmp_path: Path) -> None:
 def test_what_is_not_finite_is_saved_as_null(tmp_path: Path) -> None:
     # Without a hysteresis force, a1 and a2 have no effect on the data.
     fit = quick_fit(
-        fixed={"b1": 0.0},
-        stiffness=26065.0,
+        fixed={"b1": 0.0, "stiffness": 26065.0},
         bounds={},
         swarm=pt.ParticleSwarm(particles=12, iterations=30, velocity_limit=math.inf),
     )

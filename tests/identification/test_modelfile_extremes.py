@@ -31,9 +31,9 @@ def saved(kind: str) -> str:
     if kind == "plays":
         return json.dumps(pt.identify(LOG, "prandtl-ishlinskii").document())
     creeps = kind == "creep"
-    few = pt.ParticleSwarm(particles=8, iterations=4)
+    few = pt.ParticleSwarm(particles=8, iterations=4, runs=1)
     fit = pt.identify(
-        LOG, "dahl", swarm=few, runs=1, threads=1, drift=True, creep=[0.5] if creeps else None
+        LOG, "dahl", method=few, threads=1, drift=True, creep=[0.5] if creeps else None
     )
     return json.dumps(fit.document())
 

@@ -26,8 +26,12 @@ def log() -> pt.Dataset:
     return pt.Dataset(u=u, y=STAGE.simulate(u, 1 / 125.0).x + 2e-6, dt=1 / 125.0)
 
 
-def objective(**asked: Any) -> pt.identification.Objective:
-    return pt.identification.Objective(log(), "dahl", fixed=HELD, **asked)
+def objective(
+    threads: int | None = None, **parameters: pt.Parameter
+) -> pt.identification.Objective:
+    return pt.identification.Objective(
+        log(), "dahl", parameters={**HELD, **parameters}, threads=threads
+    )
 
 
 def places(count: int, cost: pt.identification.Objective) -> NDArray[np.float64]:
@@ -52,7 +56,7 @@ def test_descents_follow_a_valley_that_bends() -> None:
 
 
 def test_a_place_goes_through_the_bounds() -> None:
-    cost = objective(bounds={"stiffness": (2e4, 3e4)}, scales={"stiffness": "linear"})
+    cost = objective(stiffness=pt.Parameter(bounds=(2e4, 3e4), scale="linear"))
     assert cost.ranges["stiffness"] == (2e4, 3e4)
     k = list(cost.ranges).index("stiffness")
     place = np.full(len(cost.ranges), 0.5)
@@ -105,7 +109,7 @@ def test_ctrl_c_is_raised_and_no_costs_are_made_up() -> None:
     """So many costs take ten seconds."""
     once = log()
     u, y = np.tile(once.u, 20), np.tile(once.y, 20)
-    cost = pt.identification.Objective(pt.Dataset(u=u, y=y, dt=once.dt), "dahl", fixed=HELD)
+    cost = pt.identification.Objective(pt.Dataset(u=u, y=y, dt=once.dt), "dahl", parameters=HELD)
     many = places(200_000, cost)
     threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):

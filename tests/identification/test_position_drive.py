@@ -86,18 +86,18 @@ def test_which_column_is_the_drive_stays_clear() -> None:
 
 
 def test_the_fit_is_that_of_the_same_numbers_in_volts() -> None:
-    fit = pt.identify(height(), "prandtl-ishlinskii", least_squares=PLAYS)
+    fit = pt.identify(height(), "prandtl-ishlinskii", method=PLAYS)
     assert fit.model.linear == pytest.approx(GAIN, rel=1e-6)
     assert fit.model.weights == pytest.approx(WEIGHTS, rel=1e-6)
     for kind in ("dahl", "bouc-wen"):
-        here = pt.identify(height(), kind, seed=1, runs=1)
-        volts = pt.identify(height("V", 1e6), kind, seed=1, runs=1)
+        here = pt.identify(height(), kind, method=pt.Descents(seed=1))
+        volts = pt.identify(height("V", 1e6), kind, method=pt.Descents(seed=1))
         assert here.cost == pytest.approx(volts.cost, rel=0.01)
 
 
 @pytest.mark.parametrize("kind", ["prandtl-ishlinskii", "dahl", "bouc-wen"])
 def test_no_volt_is_spoken_of(kind: str) -> None:
-    fit = pt.identify(height(), kind, seed=1, runs=1)
+    fit = pt.identify(height(), kind, method=[pt.Descents(seed=1), pt.LeastSquares()])
     words = [fit.summary(), *fit.extrapolation_notes(3.0 * height().u, 1e-4)]
     assert len(words) == 3
     assert height().plot().axes[0].get_ylabel() == "drive [um]"
@@ -113,7 +113,7 @@ def test_no_volt_is_spoken_of(kind: str) -> None:
 
 
 def test_a_model_file_keeps_the_unit() -> None:
-    fit = pt.identify(height(), "prandtl-ishlinskii", least_squares=PLAYS)
+    fit = pt.identify(height(), "prandtl-ishlinskii", method=PLAYS)
     fit.save("piezo.json")
     document = json.loads(Path("piezo.json").read_text())
     units = {name: entry["unit"] for name, entry in document["parameters"].items()}

@@ -1,5 +1,7 @@
 """What a record of one rate says of others: lags that fit as well, and use beyond the record."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,7 +35,11 @@ def test_plays_fitted_at_1_hz_hold_at_others() -> None:
 
 def test_the_least_lag_is_taken_and_the_range_is_told() -> None:
     fit = pt.identify(
-        SLOW, "first-order-dahl", swarm=QUICK, runs=2, seed=1, progress=False, history="virgin"
+        SLOW,
+        "first-order-dahl",
+        method=replace(QUICK, seed=1, runs=2),
+        progress=False,
+        history="virgin",
     )
     assert fit.lags is not None
     assert fit.model.damping / fit.model.stiffness == pytest.approx(fit.lags.least, rel=1e-9)
@@ -48,18 +54,18 @@ def test_the_least_lag_is_taken_and_the_range_is_told() -> None:
 
 
 def test_a_loop_that_is_damping_is_told() -> None:
-    fit = pt.identify(SLOW, "dahl", swarm=QUICK, runs=2, seed=1, progress=False, history="virgin")
+    fit = pt.identify(
+        SLOW, "dahl", method=replace(QUICK, seed=1, runs=2), progress=False, history="virgin"
+    )
     assert any("holds at this rate only" in note for note in fit.notes)
 
 
 def test_a_mass_that_is_asked_for_is_searched() -> None:
-    names = ["mass", "damping", "piezo_coefficient", "rest_stiffness", "coulomb_force"]
     fit = pt.identify(
         SLOW,
         "first-order-dahl",
-        free=names,
-        swarm=pt.ParticleSwarm(iterations=2, polish=False),
-        runs=1,
+        parameters={"mass": pt.Parameter()},
+        method=pt.ParticleSwarm(iterations=2, polish=False, runs=1),
         progress=False,
         history="virgin",
     )

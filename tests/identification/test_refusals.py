@@ -10,11 +10,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from records import (
-    HELD,
-    TABLE_1,
-    quick,
-)
+from records import TABLE_1, quick
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -66,34 +62,32 @@ BAD_ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"model": "unknown"}, "model"),
     ({"model": None}, "model"),
     # Bounds.
-    ({"bounds": {"mass": (0.2, 0.1)}}, "bounds of mass"),
-    ({"bounds": {"mass": (0.2, 0.2)}}, "bounds of mass"),
-    ({"bounds": {"mass": (0.1, math.inf)}}, "bounds of mass"),
-    ({"bounds": {"mass": (math.nan, 0.2)}}, "bounds of mass"),
-    ({"bounds": {"mass": (-0.1, 0.2)}}, "mass"),
-    ({"bounds": {"damping": (-5.0, 10.0)}}, "damping"),
-    ({"bounds": {"mass": 0.1}}, "bounds of mass"),
-    ({"bounds": {"mass": "ab"}}, "bounds of mass"),
-    ({"bounds": {"mass": (1.0, 2.0, 3.0)}}, "bounds of mass"),
-    ({"bounds": {"mass": (None, 2.0)}}, "lower bound of mass"),
-    ({"bounds": {"weight": (0.1, 0.2)}}, "bounds"),
-    ({"bounds": {"a1": (1.0, 2.0)}, "fixed": HELD}, "bounds of a1"),
-    ({"bounds": {"up": (1.0, 2.0)}}, "bounds of up"),
-    ({"bounds": {"stiffness": (1e4, 5e4)}}, "bounds of stiffness"),
+    ({"parameters": {"mass": (0.2, 0.1)}}, "bounds of mass"),
+    ({"parameters": {"mass": (0.2, 0.2)}}, "bounds of mass"),
+    ({"parameters": {"mass": (0.1, math.inf)}}, "bounds of mass"),
+    ({"parameters": {"mass": (math.nan, 0.2)}}, "bounds of mass"),
+    ({"parameters": {"mass": (-0.1, 0.2)}}, "mass"),
+    ({"parameters": {"damping": (-5.0, 10.0)}}, "damping"),
+    ({"parameters": {"mass": "ab"}}, "tie of mass"),
+    ({"parameters": {"mass": (1.0, 2.0, 3.0)}}, "bounds of mass"),
+    ({"parameters": {"mass": (None, 2.0)}}, "lower bound of mass"),
+    ({"parameters": {"weight": (0.1, 0.2)}}, "parameters"),
+    ({"parameters": {"a1": pt.Parameter(1.0, bounds=(1.0, 2.0))}}, "bounds of a1"),
+    ({"parameters": {"up": (1.0, 2.0)}}, "parameters"),
+    ({"parameters": {"stiffness": (1e4, 5e4)}}, "bounds of stiffness"),
     # What is held.
-    ({"fixed": {"weight": 1.0}}, "fixed"),
-    ({"fixed": {"mass": -1.0}}, "mass"),
-    ({"fixed": {"mass": 0.0}}, "mass"),
-    ({"fixed": {"damping": -1.0}}, "damping"),
-    ({"fixed": {"stiffness": -1.0}}, "stiffness"),
-    ({"fixed": {"piezo_coefficient": 0.0}}, "piezo_coefficient"),
-    ({"fixed": {"a1": -1.0}}, "a1"),
-    ({"fixed": {"a2": -1.0}}, "a2"),
-    ({"fixed": {"mass": math.nan}}, "fixed mass"),
-    ({"fixed": {"b1": math.inf}}, "fixed b1"),
-    ({"fixed": {"mass": "1"}}, "mass"),
-    ({"fixed": {"mass": True}}, "mass"),
-    ({"fixed": {"b0": math.inf}}, "fixed b0"),
+    ({"parameters": {"weight": 1.0}}, "parameters"),
+    ({"parameters": {"mass": -1.0}}, "mass"),
+    ({"parameters": {"mass": 0.0}}, "mass"),
+    ({"parameters": {"damping": -1.0}}, "damping"),
+    ({"parameters": {"stiffness": -1.0}}, "stiffness"),
+    ({"parameters": {"piezo_coefficient": 0.0}}, "piezo_coefficient"),
+    ({"parameters": {"a1": -1.0}}, "a1"),
+    ({"parameters": {"a2": -1.0}}, "a2"),
+    ({"parameters": {"mass": math.nan}}, "mass"),
+    ({"parameters": {"b1": math.inf}}, "b1"),
+    ({"parameters": {"mass": True}}, "mass"),
+    ({"parameters": {"b0": math.inf}}, "b0"),
     # The delay.
     ({"delay": -1e-3}, "delay"),
     ({"delay": math.nan}, "delay"),
@@ -102,30 +96,20 @@ BAD_ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"delay": (2e-3, 1e-3)}, "bounds of delay"),
     ({"delay": (1e-3, 1e-3)}, "bounds of delay"),
     ({"delay": "long"}, "delay"),
-    ({"fixed": {"up": 0.0}}, "up"),
-    # What is free.
-    ({"free": ["weight"]}, "free"),
-    ({"free": "mass"}, "free"),
-    ({"free": [5]}, "free"),
-    ({"free": ["up"]}, "free"),
-    ({"free": ["mass"], "fixed": {"mass": 0.2}}, "free"),
-    ({"free": ["stiffness"], "stiffness": 1e4}, "free"),
-    ({"free": ["mass", "damping"]}, "free"),
-    ({"free": []}, "free"),
-    ({"free": [*FORCES, "a1", "a2"]}, "free"),
-    ({"fixed": asdict(TABLE_1)}, "free"),
+    ({"parameters": {"up": 0.0}}, "up"),
+    # What is searched.
+    ({"parameters": {"weight": pt.Parameter()}}, "parameters"),
+    ({"parameters": {"up": pt.Parameter()}}, "parameters"),
+    ({"parameters": dict.fromkeys(FORCES, pt.Parameter())}, "stiffness"),
+    ({"parameters": asdict(TABLE_1)}, "parameters"),
     # The rest.
-    ({"stiffness": 0.0}, "stiffness"),
-    ({"stiffness": -1.0}, "stiffness"),
-    ({"stiffness": math.nan}, "stiffness"),
-    ({"stiffness": "stiff"}, "stiffness"),
-    ({"stiffness": 2.0, "fixed": {"stiffness": 3.0}}, "stiffness"),
-    ({"seed": -1}, "seed"),
-    ({"seed": 1.5}, "seed"),
-    ({"least_squares": pt.identification.LeastSquares()}, "least_squares"),
-    ({"seed": "1"}, "seed"),
-    ({"runs": 0}, "runs"),
-    ({"runs": "2"}, "runs"),
+    ({"parameters": {"stiffness": 0.0}}, "stiffness"),
+    ({"parameters": {"stiffness": -1.0}}, "stiffness"),
+    ({"parameters": {"stiffness": math.nan}}, "stiffness"),
+    ({"method": pt.LeastSquares()}, "method"),
+    ({"method": [pt.Descents(), pt.ParticleSwarm()]}, "method"),
+    ({"method": "simplex"}, "method"),
+    ({"method": pt.Descents(runs=0)}, "runs"),
     ({"threads": "two"}, "threads"),
     ({"threads": -1}, "threads"),
 ]
@@ -133,14 +117,15 @@ BAD_ARGUMENTS: list[tuple[dict[str, Any], str]] = [
 
 # Of another type than asked for.
 WRONG_TYPES: list[tuple[dict[str, Any], str]] = [
-    ({"bounds": [("mass", (0.1, 0.2))]}, "bounds"),
-    ({"bounds": {1: (0.1, 0.2)}}, "bounds"),
-    ({"fixed": ["mass"]}, "fixed"),
-    ({"fixed": {1: 2.0}}, "fixed"),
-    ({"free": 5}, "free"),
+    ({"parameters": [("mass", (0.1, 0.2))]}, "parameters"),
+    ({"parameters": {1: (0.1, 0.2)}}, "parameters"),
+    ({"parameters": ["mass"]}, "parameters"),
+    ({"parameters": "mass"}, "parameters"),
+    ({"parameters": {"mass": True}}, "mass"),
+    ({"parameters": {"mass": None}}, "mass"),
     ({"offset": "no"}, "offset"),
-    ({"swarm": "paper"}, "swarm"),
-    ({"swarm": pt.ParticleSwarm}, "swarm"),
+    ({"method": 5}, "method"),
+    ({"method": pt.ParticleSwarm}, "method"),
     ({"callback": 5}, "callback"),
 ]
 BAD = [*BAD_ARGUMENTS, *WRONG_TYPES]
@@ -148,7 +133,7 @@ BAD = [*BAD_ARGUMENTS, *WRONG_TYPES]
 
 def refused(arguments: dict[str, Any]) -> str:
     """The message with which arguments of `identify` are refused."""
-    arguments = {"data": quick(), "model": "dahl", "swarm": SMALL, **arguments}
+    arguments = {"data": quick(), "model": "dahl", "method": SMALL, **arguments}
     with pytest.raises(pt.ParameterError) as caught:
         pt.identify(arguments.pop("data"), **arguments)
     return str(caught.value)
@@ -166,7 +151,7 @@ def test_refuses_a_bad_argument(arguments: dict[str, Any], name: str) -> None:
 
 def test_the_wording_of_a_refusal() -> None:
     expected = "bounds of mass is (0.2, 0.1): expected two finite numbers, the lower one first"
-    assert refused({"bounds": {"mass": (0.2, 0.1)}}) == expected
+    assert refused({"parameters": {"mass": (0.2, 0.1)}}) == expected
 
 
 BAD_SETTINGS: list[tuple[str, Any]] = [
@@ -195,6 +180,10 @@ BAD_SETTINGS: list[tuple[str, Any]] = [
     ("min_improvement", math.nan),
     ("stall_iterations", 0),
     ("polish", "yes"),
+    ("seed", -1),
+    ("seed", 1.5),
+    ("seed", "1"),
+    ("runs", "2"),
 ]
 
 
@@ -202,3 +191,22 @@ BAD_SETTINGS: list[tuple[str, Any]] = [
 def test_refuses_a_bad_setting_of_the_swarm(name: str, value: Any) -> None:
     with pytest.raises(pt.ParameterError, match=f"^{name} is .*: expected "):
         pt.ParticleSwarm(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "argument"),
+    [
+        ({"parameters": {"mass": -1.0}}, "mass"),
+        ({"parameters": {"weight": 1.0}}, "parameters"),
+        ({"constraints": "a2 < b1"}, "constraints"),
+        ({"method": 5}, "method"),
+        ({"drift": -1.0}, "drift"),
+        ({"delay": "long"}, "delay"),
+        ({"threads": -1}, "threads"),
+        ({"model": "unknown"}, "model"),
+    ],
+)
+def test_an_error_has_the_name_of_its_argument(arguments: dict[str, Any], argument: str) -> None:
+    with pytest.raises(pt.ParameterError) as caught:
+        pt.identify(quick(), **{"model": "dahl", **arguments})
+    assert caught.value.argument == argument

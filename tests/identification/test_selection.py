@@ -45,7 +45,7 @@ def test_plays_are_found_without_a_search() -> None:
 
 
 def test_smooth_tips_are_told_from_plays(tmp_path: Path) -> None:
-    fit = pt.identify(record(SMOOTH, 1e-9), seed=1, runs=2, progress=False)
+    fit = pt.identify(record(SMOOTH, 1e-9), method=pt.Descents(seed=1, runs=2), progress=False)
     assert fit.model.info.name in ("first-order-dahl", "parallel-dahl")
     assert fit.trials[0].model == fit.model.info.name
     assert fit.trials[0].rms < 0.5 * next(
@@ -68,7 +68,7 @@ def test_the_swing_of_a_mode_does_not_hide_what_is_left() -> None:
     u = 37.5 - 30.0 * np.cos(2.0 * np.pi * (1.0 + 20.0 * T) * T)
     y = swinging.simulate(u, DT).x + 1e-8 * np.random.default_rng(0).normal(size=T.size)
     few = pt.identification.LeastSquares(count=1, dead_zones=False, creep=False, dynamics="second")
-    fit = pt.identify(pt.Dataset(u=u, y=y, dt=DT), "prandtl-ishlinskii", least_squares=few)
+    fit = pt.identify(pt.Dataset(u=u, y=y, dt=DT), "prandtl-ishlinskii", method=few)
     # The motion between samples is no less than the residual, which is far above the noise.
     assert 3e-8 < fit.cost < 3.0 * sample_noise(y)
     trial = Trial("prandtl-ishlinskii", "Prandtl-Ishlinskii", fit.cost)
@@ -78,7 +78,7 @@ def test_the_swing_of_a_mode_does_not_hide_what_is_left() -> None:
 
 def test_parameters_need_a_named_model() -> None:
     with pytest.raises(pt.ParameterError, match="name the model"):
-        pt.identify(record(PLAYS, 1e-8), fixed={"mass": 0.1})
+        pt.identify(record(PLAYS, 1e-8), parameters={"mass": 0.1})
 
 
 def test_a_kind_that_diverges_on_the_rest_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,6 +97,6 @@ def test_a_kind_that_diverges_on_the_rest_is_left_out(monkeypatch: pytest.Monkey
         return scored(self, *args, **kwargs)
 
     monkeypatch.setattr(pt.identification.IdentifiedModel, "score", diverging)
-    fit = pt.identify(log, seed=1, runs=1, swarm=pt.ParticleSwarm(particles=8, iterations=5))
+    fit = pt.identify(log, method=pt.ParticleSwarm(particles=8, iterations=5, seed=1, runs=1))
     assert names[0] not in {trial.model for trial in fit.trials}
     assert fit.trials

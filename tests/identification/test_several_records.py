@@ -26,12 +26,13 @@ NOISE = 20e-9
 # Measured beforehand, as the records here hardly show the shape of the hysteresis.
 ASKED: dict[str, Any] = {
     "model": "dahl",
-    "stiffness": STAGE.stiffness,
-    "fixed": {"a1": STAGE.a1, "a2": STAGE.a2},
+    "parameters": {"stiffness": STAGE.stiffness, "a1": STAGE.a1, "a2": STAGE.a2},
     "history": "virgin",
-    "seed": 1,
+    "method": pt.Descents(seed=1),
     "progress": False,
 }
+# Beside records that have a history of their own.
+OF_STAGE = {name: value for name, value in ASKED.items() if name != "history"}
 SEARCHED = ("mass", "damping", "piezo_coefficient", "b1")
 
 
@@ -83,6 +84,15 @@ def both() -> pt.identification.Identification:
     return pt.identify([slow(), quick()], **ASKED)
 
 
+def own(records: list[pt.Dataset], **values: Any) -> list[pt.Record]:
+    """Records with arguments of their own, each in a list."""
+    each = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+    return [
+        pt.Record(data, **{"history": "virgin"} | one)
+        for data, one in zip(records, each, strict=True)
+    ]
+
+
 def errors(fit: pt.identification.Identification) -> dict[str, float]:
     """Relative errors of the parameters."""
     return {n: abs(getattr(fit.model, n) / getattr(STAGE, n) - 1.0) for n in SEARCHED}
@@ -125,8 +135,8 @@ def test_the_cost_is_the_weighted_rms_of_all_samples() -> None:
     assert both().cost == pytest.approx(np.sqrt(np.average(np.square(costs), weights=counts)))
     # Unequal windows and weights, on a model that does not fit them.
     parts = [slow()[0.4:2.0], quick()]
-    given = ASKED | {"fixed": ASKED["fixed"] | {"b1": 0.0}}
-    fit = pt.identify(parts, weights=[3.0, 0.5], **given)
+    given = OF_STAGE | {"parameters": ASKED["parameters"] | {"b1": 0.0}}
+    fit = pt.identify(own(parts, weight=[3.0, 0.5]), **given)
     assert fit.records[0].cost > 10.0 * NOISE
     assert fit.cost == pytest.approx(weighted(fit, [3.0, 0.5]), rel=1e-3)
     assert [one.weight for one in fit.records] == [3.0, 0.5]
@@ -183,8 +193,9 @@ def test_offsets_and_delays_of_their_own() -> None:
     u = u - u[0]
     first = record(u, dt, seed=3)
     second = record(0.7 * u[::-1] - 0.7 * u[-1], dt, offset=3e-6, late=5, seed=4)
-    asked = ASKED | {"fixed": ASKED["fixed"] | {"b1": STAGE.b1}}
-    fit = pt.identify([first, second], delay=[0.0, True], **asked)
+    asked = ASKED | {"parameters": ASKED["parameters"] | {"b1": STAGE.b1}}
+    of_stage = OF_STAGE | {"parameters": asked["parameters"]}
+    fit = pt.identify(own([first, second], delay=[0.0, True]), **of_stage)
     assert [one.delay for one in fit.records] == [0.0, pytest.approx(5e-3, abs=2e-5)]
     assert [one.offset for one in fit.records] == pytest.approx([0.0, 3e-6], abs=1e-8)
     assert fit.delay == 0.0
@@ -198,7 +209,7 @@ def test_offsets_and_delays_of_their_own() -> None:
         assert fit.score(one.data).rms == pytest.approx(one.cost, rel=1e-2)
     # One delay for both, or no offset, is worse.
     assert pt.identify([first, second], delay=0.0, **asked).cost > 5.0 * fit.cost
-    fixed = pt.identify([first, second], delay=[0.0, 5e-3], offset=[True, False], **asked)
+    fixed = pt.identify(own([first, second], delay=[0.0, 5e-3], offset=[True, False]), **of_stage)
     assert fixed.records[1].offset == 0.0
     assert fixed.records[1].cost > 2e-6
     # As the records are, also where both delays are fitted.
@@ -212,8 +223,9 @@ def test_histories_of_their_own() -> None:
         record(u, 4e-3, seed=5),
         record(u, 4e-3, seed=6, initial=STAGE.equilibrium([60.0, 0.0])),
     ]
-    asked = ASKED | {"fixed": {"a1": STAGE.a1, "a2": STAGE.a2, "mass": STAGE.mass}}
-    fit = pt.identify(records, **asked | {"history": ["virgin", "fit"]})
+    asked = ASKED | {"parameters": ASKED["parameters"] | {"mass": STAGE.mass}}
+    own_history = {name: value for name, value in asked.items() if name != "history"}
+    fit = pt.identify(own(records, history=["virgin", "fit"]), **own_history)
     assert [one.start.history for one in fit.records if one.start] == ["virgin", "fit"]
     assert "voltage_before" not in fit.parameters
     assert fit.records[1].parameters["voltage_before"].value == pytest.approx(60.0, abs=2.0)
@@ -230,21 +242,24 @@ def test_histories_of_their_own() -> None:
 
 
 def test_a_weight_of_two_is_a_record_given_twice() -> None:
-    heavy = pt.identify([slow(), quick()], weights=[2.0, 1.0], **ASKED)
+    heavy = pt.identify(own([slow(), quick()], weight=[2.0, 1.0]), **OF_STAGE)
     twice = pt.identify([slow(), slow(), quick()], **ASKED)
     assert heavy.cost == pytest.approx(twice.cost, rel=1e-9)
     for name in SEARCHED:
         assert getattr(heavy.model, name) == pytest.approx(getattr(twice.model, name), rel=1e-6)
     # Only ratios matter, and a large weight is nearly the record alone.
-    tenfold = pt.identify([slow(), quick()], weights=(20, 10), **ASKED)
+    tenfold = pt.identify(own([slow(), quick()], weight=(20, 10)), **OF_STAGE)
     assert tenfold.cost == pytest.approx(heavy.cost, rel=1e-12)
     alone = pt.identify(quick(), **ASKED)
-    most = pt.identify([slow(), quick()], weights=[1e-9, 1.0], **ASKED)
+    most = pt.identify(own([slow(), quick()], weight=[1e-9, 1.0]), **OF_STAGE)
     assert most.model.mass == pytest.approx(alone.model.mass, rel=1e-5)
 
 
 def test_a_list_of_one_is_that_record() -> None:
-    one, listed = pt.identify(slow(), **ASKED), pt.identify([slow()], weights=[1], **ASKED)
+    one, listed = (
+        pt.identify(slow(), **ASKED),
+        pt.identify([pt.Record(slow(), history="virgin", weight=2.0)], **OF_STAGE),
+    )
     assert listed.model == one.model
     assert listed.cost == one.cost
     assert len(one.records) == 1
@@ -256,13 +271,15 @@ def test_the_same_bits_on_any_number_of_threads_and_by_a_swarm() -> None:
     again = pt.identify([slow(), quick()], threads=1, **ASKED)
     assert again.model == both().model
     assert again.history.tobytes() == both().history.tobytes()
-    swarm = pt.identify([slow(), quick()], method="swarm", runs=1, **ASKED)
+    swarm = pt.identify([slow(), quick()], **ASKED | {"method": pt.ParticleSwarm(seed=1, runs=1)})
     assert swarm.cost == pytest.approx(both().cost, rel=1e-4)
 
 
 def test_priors_enter_once() -> None:
     free, (mean, width) = both().parameters["damping"], (20.04, 0.006)
-    pulled = pt.identify([slow(), quick()], priors={"damping": (mean, width)}, **ASKED)
+    known = {"damping": pt.Parameter(prior=(mean, width))}
+    given = ASKED | {"parameters": ASKED["parameters"] | known}
+    pulled = pt.identify([slow(), quick()], **given)
     weights = np.array([1.0 / (free.deviation or np.nan), 1.0 / width]) ** 2
     # The mean of what the records and the prior say, each as precise as it is.
     expected = float(np.average([free.value, mean], weights=weights))
@@ -271,7 +288,7 @@ def test_priors_enter_once() -> None:
     assert pulled.cost_with_priors > pulled.cost == pytest.approx(both().cost, rel=0.01)
     # Weights are shares: the same for both change nothing.
     again = pt.identify(
-        [slow(), quick()], priors={"damping": (mean, width)}, weights=[7.0, 7.0], **ASKED
+        own([slow(), quick()], weight=[7.0, 7.0]), **OF_STAGE | {"parameters": given["parameters"]}
     )
     assert again.model.damping == pytest.approx(pulled.model.damping, rel=1e-9)
 
@@ -280,7 +297,7 @@ def test_a_file_keeps_the_records(tmp_path: Path) -> None:
     dt = 1e-3
     u = multisine(1000, dt, 0.5)
     first, second = record(u - u[0], dt, seed=3), record(u - u[0], dt, late=5, seed=4)
-    fit = pt.identify([first, second], delay=[0.0, 5e-3], weights=[1, 2], **ASKED)
+    fit = pt.identify(own([first, second], delay=[0.0, 5e-3], weight=[1, 2]), **OF_STAGE)
     path = fit.save(tmp_path / "two.json")
     read = pt.load(path)
     for one, kept in zip(fit.records, read.records, strict=True):
@@ -341,7 +358,7 @@ def test_summary_table_and_pictures_show_every_record() -> None:
 def test_the_best_kind_is_chosen_on_the_rest_of_each_record() -> None:
     dt = 4e-3
     records = [record(large(2000, dt), dt, seed=1), record(0.5 * large(2000, dt), dt, seed=2)]
-    fit = pt.identify(records, seed=1, history="virgin", progress=False)
+    fit = pt.identify(records, method=pt.Descents(seed=1), history="virgin", progress=False)
     assert fit.trials
     tried = {"prandtl-ishlinskii", "first-order-dahl", "parallel-dahl", "bouc-wen"}
     assert {one.model for one in fit.trials} <= tried
@@ -377,9 +394,9 @@ def test_a_search_of_several_goes_on_from_its_checkpoint(tmp_path: Path) -> None
 def test_windows_of_one_log_are_told_apart() -> None:
     log = record(large(1500), 4e-3, seed=7)
     late = pt.Dataset(u=log.u, y=log.y, dt=log.dt)
-    fit = pt.identify([log[0.0:2.0], late[3.0:5.0]], offset=[True, False], **ASKED)
-    for window, own in ((log[0.5:1.5], 0), (log[3.5:4.5], 1), (log[3.0:5.0], 1)):
-        assert fit.score(window).stroke == fit.records[own].stroke
+    fit = pt.identify(own([log[0.0:2.0], late[3.0:5.0]], offset=[True, False]), **OF_STAGE)
+    for window, i in ((log[0.5:1.5], 0), (log[3.5:4.5], 1), (log[3.0:5.0], 1)):
+        assert fit.score(window).stroke == fit.records[i].stroke
     # No offset where none was fitted.
     assert fit.score(log[3.5:4.5]).offset == 0.0 != fit.score(log[0.5:1.5]).offset
 
@@ -392,7 +409,7 @@ def test_a_lag_that_fits_at_two_rates_is_not_said_to_hold_at_one() -> None:
         return pt.Dataset(u=u, y=stage.simulate(u, dt).x, dt=dt)
 
     # Another kind of stage than the one that made them, so that the residual is not white.
-    asked: dict[str, Any] = {"model": "bouc-wen", "history": "virgin", "seed": 1, "progress": False}
+    asked: dict[str, Any] = {"model": "bouc-wen", "history": "virgin", "progress": False}
     for records, said in (([at(0.5), at(0.5, 1200)], True), ([at(0.5), at(2.0)], False)):
         fit = pt.identify(records, **asked)
         assert fit.lags is not None
@@ -405,6 +422,13 @@ def of_force() -> pt.Dataset:
 
 def still() -> pt.Dataset:
     return pt.Dataset(u=slow().u, y=np.zeros(len(slow())), dt=slow().dt, source="dead.csv")
+
+
+def identified(records: Any, given: dict[str, Any]) -> pt.identification.Identification:
+    """Identify, with what is said of all records where none says it of its own."""
+    listed = records if isinstance(records, list) else [records]
+    own_values = any(isinstance(one, pt.Record) for one in listed)
+    return pt.identify(records, **(OF_STAGE if own_values else ASKED) | given)
 
 
 @pytest.mark.parametrize(
@@ -421,33 +445,23 @@ def still() -> pt.Dataset:
         (lambda: [slow(), still()], {}, r"record 2 \(dead.csv\): the displacement is constant"),
         (lambda: [slow(), quick()[0.0:0.003]], {}, "record 2: the window has 6 samples"),
         (
-            lambda: [slow(), quick()],
-            {"weights": [1.0]},
-            "weights has 1 entries: expected 2, one for each record",
-        ),
-        (
-            lambda: [slow(), quick()],
-            {"weights": [1.0, 0.0]},
+            lambda: own([slow(), quick()], weight=[1.0, 0.0]),
+            {},
             "record 2: weight is 0: expected a finite number above 0",
         ),
-        (lambda: [slow(), quick()], {"weights": [1.0, -2.0]}, "record 2: weight is -2"),
-        (lambda: [slow(), quick()], {"weights": [np.nan, 1.0]}, "record 1: weight is NaN"),
-        (lambda: [slow(), quick()], {"weights": [1.0, "x"]}, "record 2: weight is 'x'"),
-        (lambda: slow(), {"weights": [1.0]}, r"weights is \[1.0\]: expected none with one record"),
+        (lambda: own([slow(), quick()], weight=[1.0, -2.0]), {}, "record 2: weight is -2"),
+        (lambda: own([slow(), quick()], weight=[np.nan, 1.0]), {}, "record 1: weight is NaN"),
+        (lambda: own([slow(), quick()], weight=[1.0, "x"]), {}, "weight is 'x'"),
+        (lambda: pt.Record(slow()), {"delay": True}, "delay is True: expected it in pt.Record"),
+        (lambda: [slow(), quick()], {"delay": [0.0, 0.1, 0.2]}, "bounds of delay are"),
+        (lambda: own([slow(), quick()], delay=[0.0, -1.0]), {}, "record 2: delay is -1"),
+        (lambda: own([slow(), quick()], delay=[0.0, "x"]), {}, "delay is 'x'"),
         (
-            lambda: [slow(), quick()],
-            {"delay": [0.0, 0.1, 0.2]},
-            "delay has 3 entries: expected 2, one for each record",
+            lambda: own([slow(), quick()], history=["virgin", "old"]),
+            {},
+            "history is 'old': expected 'virgin', 'settled', 'fit'",
         ),
-        (lambda: [slow(), quick()], {"delay": [0.0, -1.0]}, "record 2: delay is -1"),
-        (lambda: [slow(), quick()], {"delay": [0.0, "x"]}, "record 2: delay is 'x'"),
-        (
-            lambda: [slow(), quick()],
-            {"history": ["virgin", "old"]},
-            "record 2: history is 'old': expected 'virgin', 'settled', 'fit'",
-        ),
-        (lambda: [slow(), quick()], {"history": ["fit"]}, "history has 1 entries: expected 2"),
-        (lambda: [slow(), quick()], {"offset": [True, 3]}, "record 2: offset is 3"),
+        (lambda: own([slow(), quick()], offset=[True, 3]), {}, "offset is 3"),
         (lambda: [slow(), quick()], {"creep": [1.0, 0.0]}, r"creep\[1\] is 0 s: expected"),
         (
             lambda: [slow(), quick()[0.0:0.1]],
@@ -457,35 +471,30 @@ def still() -> pt.Dataset:
         (
             lambda: [slow(), quick()],
             {"model": "prandtl-ishlinskii"},
-            "fixed is {.*}: expected none with the model 'prandtl-ishlinskii'",
+            "parameters is {.*: expected none with the model 'prandtl-ishlinskii'",
         ),
         (
-            lambda: [slow(), quick()],
-            {"drift": [None, True], "offset": [True, False]},
-            "record 2: drift is True: expected none with offset=False",
+            lambda: own([slow(), quick()], drift=[None, True], offset=[True, False]),
+            {},
+            "drift is True: expected none with offset=False",
         ),
         (
-            lambda: [slow(), quick()],
-            {"drift": [True]},
-            "drift has 1 entries: expected 2, one for each record",
-        ),
-        (
-            lambda: [slow(), quick()],
-            {"drift": [None, -2.0]},
-            "record 2: drift is -2: expected a finite number above 0, in s",
+            lambda: own([slow(), quick()], drift=[None, -2.0]),
+            {},
+            "drift is -2: expected a finite number above 0, in s",
         ),
     ],
 )
 def test_wrong_input_gets_one_sentence(records: Any, given: dict[str, Any], said: str) -> None:
     with pytest.raises(pt.PiezotrackError, match=f"^{said}") as caught:
-        pt.identify(records(), **ASKED | given)
+        identified(records(), given)
     assert "\n" not in str(caught.value)
 
 
 def test_what_takes_one_record_refuses_several() -> None:
     with pytest.raises(pt.ParameterError, match="data is list: expected a Dataset"):
         pt.compare([slow(), quick()])  # type: ignore[arg-type]
-    with pytest.raises(pt.ParameterError, match=r"data is \[.*: expected a Dataset, one record"):
+    with pytest.raises(pt.ParameterError, match="data is several records: expected one record"):
         pt.identification.Objective([slow(), quick()], "dahl")  # type: ignore[arg-type]
     with pytest.raises(pt.ParameterError, match="expected Datasets"):
         pt.campaign([[slow(), quick()]], ["dahl"])  # type: ignore[list-item]

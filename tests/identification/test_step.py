@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -393,12 +394,16 @@ SMALL = pt.ParticleSwarm(particles=6, iterations=5, polish=False)
 
 def test_a_step_carries_its_hysteresis_into_a_search() -> None:
     step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
-    fit = pt.identify(quick(), "dahl", initial=step, bounds=BOX, swarm=SMALL, seed=1)
+    fit = pt.identify(
+        quick(), "dahl", parameters={**step.parameters, **BOX}, method=replace(SMALL, seed=1)
+    )
     for name, value in step.hysteresis.items():
         assert getattr(fit.model, name) == value
         assert not fit.parameters[name].free
     assert not fit.scale_assumed
-    same = pt.identify(quick(), "dahl", fixed=step.hysteresis, bounds=BOX, swarm=SMALL, seed=1)
+    same = pt.identify(
+        quick(), "dahl", parameters={**BOX, **step.hysteresis}, method=replace(SMALL, seed=1)
+    )
     assert same.model == fit.model
     assert same.cost == fit.cost
 
@@ -408,29 +413,24 @@ def test_what_is_said_of_a_parameter_goes_before_the_step() -> None:
     fit = pt.identify(
         quick(),
         "dahl",
-        initial=step,
-        fixed={"a1": 100.0},
-        bounds={**BOX, "a2": (1e6, 2e6)},
-        swarm=SMALL,
+        parameters={**step.parameters, **BOX, "a2": (1e6, 2e6), "a1": 100.0},
+        method=SMALL,
     )
     assert fit.model.a1 == 100.0
     assert fit.parameters["a2"].free
     assert fit.model.b1 == step.hysteresis["b1"]
-    freed = pt.identify(quick(), "dahl", initial=step, free=[*BOX, "a1"], bounds=BOX, swarm=SMALL)
+    parameters: dict[str, Any] = {**step.parameters, **BOX, "a1": pt.Parameter()}
+    freed = pt.identify(quick(), "dahl", parameters=parameters, method=SMALL)
     assert freed.parameters["a1"].free
     assert not freed.parameters["a2"].free
-
-
-def test_initial_is_a_step() -> None:
-    hysteresis: Any = {"a1": 100.0}
-    with pytest.raises(pt.ParameterError, match="initial is dict: expected a StepResult"):
-        pt.identify(quick(), "dahl", initial=hysteresis, swarm=SMALL)
 
 
 def test_the_papers_way_from_a_step_to_a_fit() -> None:
     # The step's parameters, then four searched in the paper's box.
     step = pt.identify_step(pt.identification.StepReadings.xu_li_2010())
-    fit = pt.identify(quick(), "dahl", initial=step, bounds=BOX, seed=1)
+    fit = pt.identify(
+        quick(), "dahl", parameters={**step.parameters, **BOX}, method=pt.Descents(seed=1)
+    )
     assert fit.cost_percent < 0.1
     assert fit.model.stiffness == pytest.approx(TABLE_1.stiffness, rel=0.01)
 

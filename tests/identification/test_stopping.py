@@ -115,12 +115,12 @@ callback = seen.append if sys.argv[1] == "callback" else None
 u = 37.5 - 37.5 * np.cos(np.pi * np.arange(int(sys.argv[2])) / 1e4)
 log = pt.Dataset(u=u, y=1.6e-6 * u, dt=1 / 5000.0)
 swarm = pt.ParticleSwarm(
-    particles=int(sys.argv[3]), iterations=10**7, stall_iterations=10**7, polish=False
+    particles=int(sys.argv[3]), iterations=10**7, stall_iterations=10**7, polish=False, seed=1
 )
 print("searching", flush=True)
 try:
     pt.identify(
-        log, "dahl", history="virgin", swarm=swarm, seed=1, callback=callback
+        log, "dahl", history="virgin", method=swarm, callback=callback
     )
 except KeyboardInterrupt as stopped:
     ended = time.monotonic()
@@ -187,8 +187,8 @@ y = pt.DahlStage.xu_li_2010().simulate(u, 1 / 250.0).x
 log = pt.Dataset(u=u, y=y, dt=1 / 250.0)
 
 def search():
-    swarm = pt.ParticleSwarm(particles=12, iterations=20)
-    return pt.identify(log, "dahl", swarm=swarm, seed=1, threads=3).cost.hex()
+    swarm = pt.ParticleSwarm(particles=12, iterations=20, seed=1)
+    return pt.identify(log, "dahl", method=swarm, threads=3).cost.hex()
 
 before = search()
 reading, writing = os.pipe()

@@ -7,6 +7,7 @@ import ast
 import math
 import operator
 import re
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -41,7 +42,12 @@ def record() -> pt.Dataset:
 
 def tied(text: str) -> pt.identification.Identification:
     return pt.identify(
-        record(), "dahl", ties={"b1": text}, swarm=FEW, runs=1, threads=1, history="virgin"
+        record(),
+        "dahl",
+        parameters={"b1": text},
+        method=replace(FEW, runs=1),
+        threads=1,
+        history="virgin",
     )
 
 
@@ -177,7 +183,12 @@ def test_any_text_is_read_or_refused_in_one_sentence(text: str) -> None:
     for arguments in ({"ties": {"b1": text}}, {"constraints": [text]}, {"scales": {text: "log"}}):
         try:
             pt.identify(
-                record(), "dahl", swarm=FEW, runs=1, threads=1, history="virgin", **arguments
+                record(),
+                "dahl",
+                method=replace(FEW, runs=1),
+                threads=1,
+                history="virgin",
+                **arguments,
             )
         except (pt.ParameterError, pt.NumericalError) as error:
             message = str(error)

@@ -57,9 +57,11 @@ def record(
 def test_two_records_share_a_stage_and_nothing_else() -> None:
     slow = record(0.2, 20.0, 0.01, seconds=30.0, offset=2e-6)
     quick = record(3.0, 38.0, 1e-3, seconds=6.0, offset=-1e-6, drift=(4e-7, 2.0), seed=2)
-    fit = pt.identify(
-        [slow, quick], KIND, drift=[False, True], history="virgin", least_squares=PLAYS
-    )
+    records = [
+        pt.Record(slow, drift=False, history="virgin"),
+        pt.Record(quick, drift=True, history="virgin"),
+    ]
+    fit = pt.identify(records, KIND, method=PLAYS)
     assert fit.model.weights == pytest.approx(STAGE.weights, rel=0.01)
     assert fit.model.linear == pytest.approx(STAGE.linear, rel=0.005)
     assert fit.model.creep_weights == pytest.approx(STAGE.creep_weights, rel=0.05)
@@ -82,8 +84,8 @@ def test_one_record_alone_does_not_tell_what_two_do() -> None:
     """A small loop says nothing of the plays beyond its range; beside a large one it is used."""
     small = record(0.5, 6.0, 0.005)
     large = record(0.5, 38.0, 0.005, seed=3)
-    alone = pt.identify(small, KIND, history="virgin", least_squares=PLAYS)
-    both = pt.identify([small, large], KIND, history="virgin", least_squares=PLAYS)
+    alone = pt.identify(small, KIND, history="virgin", method=PLAYS)
+    both = pt.identify([small, large], KIND, history="virgin", method=PLAYS)
     unknown = abs(alone.model.weights[2] / STAGE.weights[2] - 1.0)
     assert unknown > 0.2
     assert both.model.weights == pytest.approx(STAGE.weights, rel=0.02)
@@ -92,12 +94,12 @@ def test_one_record_alone_does_not_tell_what_two_do() -> None:
 @pytest.mark.parametrize("delay", [0.0, 0.4e-3, 3e-3, 7.3e-3])
 def test_a_late_reading_is_found(delay: float) -> None:
     log = record(4.0, 35.0, 1e-3, seconds=6.0, delay=delay, offset=1e-7)
-    fit = pt.identify(log, KIND, delay=True, history="virgin", least_squares=PLAYS)
+    fit = pt.identify(log, KIND, delay=True, history="virgin", method=PLAYS)
     assert fit.delay == pytest.approx(delay, abs=5e-6)
     assert fit.model.weights == pytest.approx(STAGE.weights, rel=0.02)
     assert fit.cost == pytest.approx(NOISE, rel=0.06)
     assert fit.fitted.rms == pytest.approx(fit.cost, rel=1e-4)
-    known = pt.identify(log, KIND, delay=delay, history="virgin", least_squares=PLAYS)
+    known = pt.identify(log, KIND, delay=delay, history="virgin", method=PLAYS)
     assert known.delay == delay
     assert known.model.weights == pytest.approx(fit.model.weights, rel=1e-2)
 
@@ -112,7 +114,7 @@ def test_a_delay_is_told_from_a_lag_by_two_rates() -> None:
         noise = NOISE * np.random.default_rng(seed).standard_normal(u.size)
         logs.append(pt.Dataset(u=u, y=y + noise, dt=dt))
     lag = replace(PLAYS, dynamics="first")
-    fit = pt.identify(logs, KIND, delay=True, history="virgin", least_squares=lag)
+    fit = pt.identify(logs, KIND, delay=True, history="virgin", method=lag)
     assert fit.model.time_constant == pytest.approx(4e-3, rel=0.02)
     for one in fit.records:
         assert one.delay < 1e-4
@@ -121,11 +123,11 @@ def test_a_delay_is_told_from_a_lag_by_two_rates() -> None:
 def test_a_drift_is_that_of_its_record_alone(tmp_path: Path) -> None:
     log = record(0.5, 35.0, 0.005, seconds=40.0, drift=(6e-7, 12.0), offset=3e-7)
     part, rest = log[0.0:24.0], log[24.0:]
-    fit = pt.identify(part, KIND, history="virgin", least_squares=PLAYS)
+    fit = pt.identify(part, KIND, history="virgin", method=PLAYS)
     assert fit.drift is not None
     assert fit.drift.amplitude == pytest.approx(6e-7, rel=0.3)
     assert "a drift of -0.5" in fit.summary()
-    still = pt.identify(part, KIND, drift=False, history="virgin", least_squares=PLAYS)
+    still = pt.identify(part, KIND, drift=False, history="virgin", method=PLAYS)
     assert still.drift is None
     assert still.cost > 1.5 * fit.cost
     # It goes on where the record does, offset and all, and is none of another record.
@@ -153,7 +155,7 @@ def test_a_mode_far_above_the_drive_is_no_lag() -> None:
     noise = NOISE * np.random.default_rng(4).standard_normal(u.size)
     log = pt.Dataset(u=u, y=stage.simulate(u, 2.5e-4).x + noise, dt=2.5e-4)
     settings = replace(PLAYS, creep=False, dynamics="auto")
-    fit = pt.identify(log, KIND, history="virgin", drift=False, least_squares=settings)
+    fit = pt.identify(log, KIND, history="virgin", drift=False, method=settings)
     assert fit.model.frequency == pytest.approx(300.0, rel=0.05)
     assert fit.cost == pytest.approx(NOISE, rel=0.1)
 
@@ -177,7 +179,7 @@ def test_too_many_threads_are_refused() -> None:
 
 
 def test_a_record_without_a_drift_gets_none() -> None:
-    fit = pt.identify(record(0.5, 35.0, 0.005), KIND, history="virgin", least_squares=PLAYS)
+    fit = pt.identify(record(0.5, 35.0, 0.005), KIND, history="virgin", method=PLAYS)
     assert fit.drift is None
 
 
@@ -189,7 +191,7 @@ def test_a_record_without_a_drift_gets_none() -> None:
         ({"drift": float("nan")}, "drift is nan: expected"),
         ({"delay": -1.0}, "delay is -1 s: expected 0 s or above"),
         ({"delay": 100.0}, "delay is 100 s: expected 0 s or above, below the record's 12"),
-        ({"delay": (2.0, 1.0)}, r"bounds of delay are \(2, 1\) s: expected the lower one first"),
+        ({"delay": (2.0, 1.0)}, r"delay is \(2, 1\) s: expected the lower bound first"),
     ],
 )
 def test_what_is_no_drift_or_delay_is_refused(given: dict[str, Any], said: str) -> None:

@@ -19,8 +19,9 @@ fn log() -> (Vec<f64>, Vec<f64>) {
 }
 
 fn spec() -> Spec {
-    let fixed = vec![("mass".into(), DahlStage::xu_li_2010().mechanics.mass)];
-    Spec { fixed, stiffness: Some(26065.0), offset: true, ..Spec::of(Model::Dahl) }
+    let mass = DahlStage::xu_li_2010().mechanics.mass;
+    let fixed = vec![("mass".into(), mass), ("stiffness".into(), 26065.0)];
+    Spec { fixed, offset: true, ..Spec::of(Model::Dahl) }
 }
 
 fn found(settings: &DescentSettings, seed: u64, runs: usize, threads: usize) -> Identification {

@@ -21,7 +21,7 @@ fn problem(spec: &Spec) -> Result<Problem, Error> {
 fn spec() -> Spec {
     let bounds = [("damping", 1.0, 1e5), ("a1", 10.0, 1e4), ("a2", 1e3, 1e7), ("b1", 5e2, 2e6)];
     Spec {
-        stiffness: Some(26065.0),
+        fixed: vec![("stiffness".into(), 26065.0)],
         bounds: bounds.map(|(name, low, high)| (name.to_owned(), (low, high))).to_vec(),
         ..Spec::of(Model::Dahl)
     }

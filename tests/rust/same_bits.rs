@@ -23,7 +23,7 @@ fn log() -> (Vec<f64>, Vec<f64>) {
 fn spec() -> Spec {
     Spec {
         bounds: vec![("damping".into(), (1e3, 5e3)), ("a1".into(), (10.0, 1e3))],
-        stiffness: Some(26065.0),
+        fixed: vec![("stiffness".into(), 26065.0)],
         offset: true,
         ..Spec::of(Model::Dahl)
     }
@@ -93,9 +93,7 @@ fn one_lane_and_many_with_friction_and_delay() {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
     let mut spec = spec();
-    spec.free = Some(
-        ["mass", "damping", "piezo_coefficient", "a1", "a2", "b1", "b0"].map(String::from).to_vec(),
-    );
+    spec.free = vec!["mass".into()];
     spec.bounds.push(("b0".into(), (-100.0, 400.0)));
     spec.delay = Delay::Between(0.0, 0.02);
     let problem = Problem::new(&record, &spec, NEVER).unwrap();
@@ -126,10 +124,13 @@ fn one_lane_and_many_of_models_with_an_exponent() {
     for (model, (hold, exponent)) in models.into_iter().flat_map(|m| cases.map(|case| (m, case))) {
         let has_exponent = model.info().parameters.iter().any(|one| one.name == "exponent");
         let record = Record::new(&u, &y, DT, hold, 100).unwrap();
+        let mut fixed = vec![("stiffness".into(), 19567.0)];
+        if has_exponent {
+            fixed.push(("exponent".into(), exponent));
+        }
         let spec = Spec {
             model,
-            fixed: if has_exponent { vec![("exponent".into(), exponent)] } else { vec![] },
-            stiffness: Some(19567.0),
+            fixed,
             offset: true,
             delay: Delay::Between(0.0, 0.02),
             ..Spec::of(Model::Dahl)
@@ -153,13 +154,10 @@ fn one_lane_and_many_of_models_with_an_exponent() {
 fn one_lane_and_many_with_a_limit_that_falls_in_some() {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
-    let free = ["damping", "piezo_coefficient", "rest_stiffness", "coulomb_force", "static_ratio"];
     let spec = Spec {
         model: Model::LuGre,
-        free: Some(free.map(String::from).to_vec()),
         bounds: vec![("static_ratio".into(), (1.0, 1.5))],
-        fixed: vec![("mass".into(), 0.3)],
-        stiffness: Some(19567.0),
+        fixed: vec![("mass".into(), 0.3), ("stiffness".into(), 19567.0)],
         offset: true,
         ..Spec::of(Model::Dahl)
     };

@@ -25,8 +25,9 @@ fn log(size: f64, rate: f64, samples: i32) -> (Vec<f64>, Vec<f64>) {
 }
 
 fn spec() -> Spec {
-    let fixed = vec![("mass".into(), DahlStage::xu_li_2010().mechanics.mass)];
-    Spec { fixed, stiffness: Some(26065.0), offset: true, ..Spec::of(Model::Dahl) }
+    let mass = DahlStage::xu_li_2010().mechanics.mass;
+    let fixed = vec![("mass".into(), mass), ("stiffness".into(), 26065.0)];
+    Spec { fixed, offset: true, ..Spec::of(Model::Dahl) }
 }
 
 fn plan() -> Plan {
@@ -134,7 +135,7 @@ const TIMES: [f64; 2] = [0.3, 4.0];
 fn creeping() -> Spec {
     Spec {
         model: Model::FirstOrderDahl,
-        fixed: vec![("mass".into(), 0.1828)],
+        fixed: vec![("mass".into(), 0.1828), ("stiffness".into(), 26065.0)],
         creep_times: TIMES.to_vec(),
         ..spec()
     }

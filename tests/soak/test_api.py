@@ -392,22 +392,15 @@ def identify(script: Script, draw: Draw) -> None:
     kind = draw(st.sampled_from(list(KINDS)))
     names = st.sampled_from([*KINDS[kind].parameter_names(), "x"])
     box = st.tuples(number(0.1).other, number(10.0).other)
+    entry = st.one_of(number(1.0).other, box, names, TIES)
     slots = {
-        "free": Slot(None, st.lists(names, max_size=3)),
-        "fixed": Slot(None, st.dictionaries(names, number(1.0).other, max_size=2)),
-        "bounds": Slot(None, st.dictionaries(names, box, max_size=2)),
-        "scales": Slot(None, st.dictionaries(names, st.sampled_from(["linear", "log", ""]))),
-        "ties": Slot(None, st.dictionaries(names, st.one_of(names, TIES), max_size=2)),
+        "parameters": Slot(None, st.dictionaries(names, entry, max_size=4)),
         "constraints": Slot(None, st.lists(st.tuples(names, names).map(" < ".join), max_size=2)),
-        "priors": Slot(None, st.dictionaries(names, box, max_size=2)),
-        "stiffness": number(None, near=1e4),
         "offset": truth(True),
         "delay": Slot(None, st.one_of(st.booleans(), number(1e-3).other, box)),
-        "seed": count(1),
-        "runs": anything(1, 2, 0, -1, 1.5, 3),
         "threads": anything(1, 2, 0, -1, 257, 2**64),
     }  # fmt: skip
-    fit = script.new("pt.identify", made, kind, swarm=TINY, **arguments(draw, slots, most=2))
+    fit = script.new("pt.identify", made, kind, method=TINY, **arguments(draw, slots, most=2))
     use_fit(script, fit, made)
 
 
@@ -427,7 +420,7 @@ def least_squares(script: Script, draw: Draw) -> None:
         "dead_zones": anything(True, False, 0, 3), "dynamics": word("first", "second", None),
         "creep": Slot(False, st.one_of(st.booleans(), numbers(0.1, 1.0).other)),
     }  # fmt: skip
-    how = script.new("pt.identification.LeastSquares", **arguments(draw, slots, most=2))
+    how = script.new("pt.LeastSquares", **arguments(draw, slots, most=2))
     if how is not None:
         kind = draw(st.sampled_from(WEIGHTED))
         slots = {
@@ -435,7 +428,7 @@ def least_squares(script: Script, draw: Draw) -> None:
             "delay": Slot(None, st.one_of(st.booleans(), number(1e-3).other)),
         }  # fmt: skip
         given = arguments(draw, slots, most=2)
-        fit = script.new("pt.identify", made, kind, least_squares=how, **given)
+        fit = script.new("pt.identify", made, kind, method=how, **given)
         use_fit(script, fit, made)
 
 
@@ -451,13 +444,15 @@ SWARM = slots_of(
     update=word("classic", "hypersphere", "hypersphere-radial"),
     topology=word("ring", "global", "random"),
     boundary=word("absorb", "rebound", "reflect", "invisible"),
+    seed=count(1),
+    runs=anything(1, 2, 0, -1, 1.5, 3),
 )
 
 
 def swarm(script: Script, draw: Draw) -> None:
     made = script.new("pt.ParticleSwarm", **arguments(draw, SWARM))
     if made is not None:
-        use_fit(script, script.new("pt.identify", LOG, "dahl", swarm=made, runs=1, seed=3), LOG)
+        use_fit(script, script.new("pt.identify", LOG, "dahl", method=made), LOG)
 
 
 # Name, body, and its share of the calls: what is slow has less.

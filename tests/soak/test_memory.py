@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,7 +40,7 @@ class StopError(Exception):
 
 def search(callback: Callable[[Any], object] | None = None) -> None:
     with suppress(StopError, pt.Interrupted):
-        pt.identify(DATA, "dahl", swarm=SMALL, runs=1, callback=callback)
+        pt.identify(DATA, "dahl", method=replace(SMALL, runs=1), callback=callback)
 
 
 def raising(_: Any) -> None:

@@ -141,15 +141,20 @@ def test_identification_finds_the_parameters(tmp_path: Path) -> None:
     log = pt.Dataset(u=u, y=y, dt=dt)
     searched = ["damping", "piezo_coefficient", "alpha", "beta", "gamma"]
     searched += ["asymmetry", "sign_asymmetry"]
-    held = {"mass": STAGE.mass, "stiffness": STAGE.stiffness}
-    fit = pt.identify(log, "asymmetric-bouc-wen", free=searched, fixed=held, seed=2)
+    known = {"mass": STAGE.mass, "stiffness": STAGE.stiffness}
+    fit = pt.identify(
+        log,
+        "asymmetric-bouc-wen",
+        parameters={**known, "sign_asymmetry": pt.Parameter()},
+        method=pt.Descents(seed=2),
+    )
     assert fit.cost == pytest.approx(20e-9, rel=0.05)
     for name in searched:
         assert getattr(fit.model, name) == pytest.approx(getattr(STAGE, name), rel=0.03), name
     assert pt.load(fit.save(tmp_path / "model.json")).model == fit.model
     assert "epsilon" in fit.summary()
     # One asymmetry is searched without being asked for, the other is held at 0.
-    asked = pt.identify(log[:2.0], "asymmetric-bouc-wen", seed=2, runs=1)
+    asked = pt.identify(log[:2.0], "asymmetric-bouc-wen", method=pt.Descents(seed=2))
     assert asked.parameters["asymmetry"].free
     assert not asked.parameters["sign_asymmetry"].free
     assert asked.model.sign_asymmetry == 0.0

@@ -135,7 +135,7 @@ def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = wandering(3000)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
     settings = LeastSquares(thresholds=STAGE.thresholds, creep=False, dynamics=None)
-    found = pt.identify(log, NAME, least_squares=settings)
+    found = pt.identify(log, NAME, method=settings)
     assert found.cost < 1e-12
     assert found.offset == pytest.approx(-4e-6, abs=1e-9)
     assert (found.model.low, found.model.high) == (0.0, 75.0)
@@ -155,11 +155,11 @@ def test_a_noisy_record_is_described_to_its_noise() -> None:
     y = STAGE.simulate(u, 5e-3).x + noise * rng.standard_normal(u.size)
     log = pt.Dataset(u=u, y=y, dt=5e-3)
     settings = LeastSquares(thresholds=STAGE.thresholds, creep=False, dynamics=None)
-    found = pt.identify(log[:18.0], NAME, least_squares=settings)
+    found = pt.identify(log[:18.0], NAME, method=settings)
     assert found.cost == pytest.approx(noise, rel=0.05)
     assert found.score(log[18.0:]).rms < 1.1 * noise
     # No symmetric stage describes it.
-    symmetric = pt.identify(log[:18.0], "maxwell-slip", least_squares=settings)
+    symmetric = pt.identify(log[:18.0], "maxwell-slip", method=settings)
     assert symmetric.cost > 10.0 * noise
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -272,7 +272,12 @@ def log(noise: float = 0.0, exponent: float = 1.0) -> pt.Dataset:
 
 def identified(noise: float = 0.05e-6) -> pt.identification.Identification:
     swarm = pt.ParticleSwarm(particles=40, iterations=150)
-    return pt.identify(log(noise), model="bouc-wen", stiffness=19567.0, seed=2, runs=2, swarm=swarm)
+    return pt.identify(
+        log(noise),
+        model="bouc-wen",
+        parameters={"stiffness": 19567.0},
+        method=replace(swarm, seed=2, runs=2),
+    )
 
 
 def test_identification_recovers_the_parameters() -> None:
@@ -294,7 +299,7 @@ def test_identification_with_another_exponent() -> None:
     held = {"exponent": 2.0, "mass": 0.1283, "damping": 1580.0, "stiffness": 19567.0}
     held |= {"piezo_coefficient": 1.7339e-6}
     swarm = pt.ParticleSwarm(particles=12, iterations=20)
-    fit = pt.identify(data, model="bouc-wen", fixed=held, runs=1, swarm=swarm)
+    fit = pt.identify(data, model="bouc-wen", parameters=held, method=replace(swarm, runs=1))
     assert fit.cost < 1e-9
     assert fit.model.beta == pytest.approx(TRUE["beta"] * 1e5, rel=1e-3)
 
@@ -318,16 +323,16 @@ def test_a_result_can_be_read_saved_and_loaded(tmp_path: Path) -> None:
 
 def test_what_a_search_of_this_model_refuses() -> None:
     with pytest.raises(pt.ParameterError, match="exponent"):
-        pt.identify(log(), model="bouc-wen", free=["exponent"])
+        pt.identify(log(), model="bouc-wen", parameters={"exponent": pt.Parameter()})
     with pytest.raises(pt.ParameterError, match="a1"):
-        pt.identify(log(), model="bouc-wen", fixed={"a1": 1.0})
+        pt.identify(log(), model="bouc-wen", parameters={"a1": 1.0})
     with pytest.raises(pt.ParameterError, match="expected one of 'dahl', 'bouc-wen'"):
         pt.identify(log(), model="jiles-atherton")
 
 
 def test_without_a_force_the_scale_is_assumed() -> None:
     swarm = pt.ParticleSwarm(particles=8, iterations=3, polish=False)
-    fit = pt.identify(log(), model="bouc-wen", runs=1, swarm=swarm)
+    fit = pt.identify(log(), model="bouc-wen", method=replace(swarm, runs=1))
     assert fit.scale_assumed
     assert fit.model.stiffness == 1e6
     assert "m and b scale with it" in " ".join(fit.summary().split())

@@ -95,7 +95,7 @@ def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = wandering(3000)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
     settings = LeastSquares(creep=False, dynamics=None)
-    found = pt.identify(log, "duhem", least_squares=settings)
+    found = pt.identify(log, "duhem", method=settings)
     assert found.cost < 1e-9
     assert found.offset == pytest.approx(-4e-6, abs=1e-8)
     assert found.model.alpha == pytest.approx(STAGE.alpha, rel=0.01)
@@ -109,7 +109,7 @@ def test_it_has_no_places() -> None:
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 0.01).x, dt=0.01)
     for settings in (LeastSquares(count=5), LeastSquares(thresholds=[5.0])):
         with pytest.raises(pt.ParameterError, match="Duhem has no thresholds"):
-            pt.identify(log, "duhem", least_squares=settings)
+            pt.identify(log, "duhem", method=settings)
 
 
 def test_it_explains_a_measured_log_and_foretells_another(tmp_path: Path) -> None:

@@ -196,7 +196,9 @@ def noisy_benchmark() -> pt.Dataset:
 def test_benchmark_parameters_are_recovered() -> None:
     """Every one within 1 %, from the noisy record, with bounds from the record alone."""
     log = noisy_benchmark().interpolate(2)
-    fit = pt.identify(log, "bouc-wen-oscillator", fixed={"beta": 1e3}, seed=1, runs=1)
+    fit = pt.identify(
+        log, "bouc-wen-oscillator", parameters={"beta": 1e3}, method=pt.Descents(seed=1)
+    )
     assert fit.cost == pytest.approx(7e-6, rel=0.05)
     assert not fit.scale_assumed
     for name, value in dataclasses.asdict(BENCHMARK).items():
@@ -268,7 +270,9 @@ def test_identification_of_friction(tmp_path: Path) -> None:
     u = slow_drive(1000, dt)
     noise = 20e-9 * np.random.default_rng(5).standard_normal(u.size)
     log = pt.Dataset(u=u, y=stage.simulate(u, dt).x + noise, dt=dt)
-    fit = pt.identify(log, "first-order-dahl", stiffness=26065.0, seed=2, runs=1)
+    fit = pt.identify(
+        log, "first-order-dahl", parameters={"stiffness": 26065.0}, method=pt.Descents(seed=2)
+    )
     assert fit.cost == pytest.approx(20e-9, rel=0.1)
     for name in ("damping", "piezo_coefficient", "rest_stiffness", "coulomb_force"):
         assert getattr(fit.model, name) == pytest.approx(getattr(stage, name), rel=0.02), name
@@ -324,9 +328,11 @@ def test_what_is_not_in_the_data_is_not_searched() -> None:
     """Beta and the exponents are held, and the reason is said."""
     log = noisy_benchmark()
     with pytest.raises(pt.ParameterError, match="only the products beta gamma and beta delta"):
-        pt.identify(log, "bouc-wen-oscillator", free=["mass", "beta"])
+        pt.identify(
+            log, "bouc-wen-oscillator", parameters={"mass": pt.Parameter(), "beta": pt.Parameter()}
+        )
     with pytest.raises(pt.ParameterError, match="all candidates of a search share it"):
-        pt.identify(log, "first-order-dahl", free=["exponent"])
+        pt.identify(log, "first-order-dahl", parameters={"exponent": pt.Parameter()})
 
 
 def test_interpolated_records() -> None:

@@ -131,11 +131,14 @@ def test_b0_is_found() -> None:
     fit = pt.identify(
         pt.Dataset(u=u, y=x + noise, dt=dt),
         "dahl",
-        free=["damping", "piezo_coefficient", "b1", "b0"],
-        fixed={"mass": 0.1828, "a1": TABLE_1.a1, "a2": TABLE_1.a2},
-        stiffness=TABLE_1.stiffness,
-        runs=2,
-        seed=1,
+        parameters={
+            "mass": 0.1828,
+            "a1": TABLE_1.a1,
+            "a2": TABLE_1.a2,
+            "stiffness": TABLE_1.stiffness,
+            "b0": pt.Parameter(),
+        },
+        method=pt.Descents(seed=1, runs=2),
     )
     assert fit.cost < 21e-9
     assert fit.model.b0 == pytest.approx(120.0, rel=5e-3)

@@ -134,7 +134,7 @@ def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = 37.5 * (1.0 - fall * np.cos(2.0 * np.pi * phase))
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
     settings = LeastSquares(thresholds=STAGE.thresholds, dynamics=None)
-    found = pt.identify(log, NAME, least_squares=settings)
+    found = pt.identify(log, NAME, method=settings)
     assert found.cost < 5e-9
     assert found.offset == pytest.approx(-4e-6, abs=1e-8)
     # Linear, four weights, slope, shift, two shares of the creep and the offset.
@@ -149,7 +149,7 @@ def test_dead_zones_are_refused() -> None:
         pt.identify(
             pt.Dataset(u=wandering(500), y=STAGE.simulate(wandering(500), 0.01).x, dt=0.01),
             NAME,
-            least_squares=LeastSquares(dead_zones=2),
+            method=LeastSquares(dead_zones=2),
         )
 
 

@@ -166,17 +166,15 @@ def test_identification_finds_the_motion(tmp_path: Path) -> None:
     fit = pt.identify(
         log,
         "lugre",
-        fixed={"mass": STAGE.mass, "stiffness": STAGE.stiffness, "viscous_friction": 5.0},
-        free=[
-            "damping",
-            "piezo_coefficient",
-            "rest_stiffness",
-            "micro_damping",
-            "coulomb_force",
-            "static_ratio",
-            "stribeck_velocity",
-        ],
-        seed=2,
+        parameters={
+            "mass": STAGE.mass,
+            "stiffness": STAGE.stiffness,
+            "viscous_friction": 5.0,
+            "micro_damping": pt.Parameter(),
+            "static_ratio": pt.Parameter(),
+            "stribeck_velocity": pt.Parameter(),
+        },
+        method=pt.Descents(seed=2),
     )
     assert fit.cost == pytest.approx(10e-9, rel=0.1)
     for name in ("piezo_coefficient", "rest_stiffness", "static_ratio", "coulomb_force"):

@@ -146,7 +146,7 @@ def test_least_squares_find_the_elements(tmp_path: Path) -> None:
     y = STAGE.simulate(u, 5e-3).x + 5e-9 * np.random.default_rng(3).standard_normal(u.size)
     log = pt.Dataset(u=u, y=y, dt=5e-3)
     asked = pt.identification.LeastSquares(thresholds=thresholds, creep=False, dynamics=None)
-    fit = pt.identify(log, "maxwell-slip", least_squares=asked)
+    fit = pt.identify(log, "maxwell-slip", method=asked)
     assert fit.cost == pytest.approx(5e-9, rel=0.1)
     assert fit.model.piezo_coefficient == pytest.approx(STAGE.piezo_coefficient, rel=1e-3)
     np.testing.assert_allclose(fit.model.stiffness_ratios, STAGE.stiffness_ratios, rtol=0.01)

@@ -78,8 +78,8 @@ def test_a_decimated_log_identifies_the_same_stage() -> None:
     fit = pt.identify(
         log.decimate(25),
         "dahl",
-        fixed={"mass": stage.mass, "a1": stage.a1, "a2": stage.a2, "b1": stage.b1},
-        seed=1,
+        parameters={"mass": stage.mass, "a1": stage.a1, "a2": stage.a2, "b1": stage.b1},
+        method=pt.Descents(seed=1),
     )
     assert fit.cost < 0.3e-7, "white noise falls with the root of the factor"
     assert fit.model.stiffness == pytest.approx(stage.stiffness, rel=5e-3)

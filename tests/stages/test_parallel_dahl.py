@@ -175,13 +175,13 @@ def test_identification_finds_the_motion(tmp_path: Path) -> None:
     u = slow_drive(1000, dt)
     noise = 20e-9 * np.random.default_rng(5).standard_normal(u.size)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, dt).x + noise, dt=dt)
-    fit = pt.identify(log, "parallel-dahl", seed=2)
+    fit = pt.identify(log, "parallel-dahl", method=pt.Descents(seed=2))
     assert fit.cost == pytest.approx(20e-9, rel=0.1)
     other = 0.4 * u[::-1] + 10.0
     expected, found = STAGE.simulate(other, dt).x, fit.model.simulate(other, dt).x
     assert np.abs(found - expected).max() < 2e-3 * np.ptp(expected)
     # One element leaves the tips.
-    single = pt.identify(log, "first-order-dahl", seed=2, runs=1)
+    single = pt.identify(log, "first-order-dahl", method=pt.Descents(seed=2))
     assert single.cost > 10 * fit.cost
     assert pt.load(fit.save(tmp_path / "friction.json")).model == fit.model
     assert "sigma3/K" in fit.summary()

@@ -90,7 +90,7 @@ def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = wandering(3000)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
     settings = LeastSquares(thresholds=STAGE.thresholds, creep=False, dynamics=None)
-    found = pt.identify(log, NAME, least_squares=settings)
+    found = pt.identify(log, NAME, method=settings)
     assert found.cost < 1e-12
     assert found.offset == pytest.approx(-4e-6, abs=1e-9)
     for name in ("a1", "a2", "a3", "low", "high"):

@@ -104,7 +104,7 @@ def test_the_inverse_undoes_the_stage_along_any_path(stage: pt.PreisachStage) ->
 def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = wandering(3000)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
-    found = pt.identify(log, "preisach", least_squares=SETTINGS)
+    found = pt.identify(log, "preisach", method=SETTINGS)
     # Neighbouring masses are drawn together by a trace.
     assert found.cost < 1e-10
     assert found.offset == pytest.approx(-4e-6, abs=1e-9)
@@ -117,7 +117,7 @@ def test_a_noisy_record_is_explained_to_the_noise() -> None:
     u = wandering(3000)
     noise = 20e-9 * np.random.default_rng(2).standard_normal(u.size)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x + noise, dt=1e-3)
-    found = pt.identify(log, "preisach", least_squares=SETTINGS)
+    found = pt.identify(log, "preisach", method=SETTINGS)
     assert found.cost == pytest.approx(20e-9, rel=0.03)
 
 
@@ -130,7 +130,7 @@ def test_plays_are_explained_as_finely_as_the_cells_are() -> None:
     log = pt.Dataset(u=u, y=plays.simulate(u, 1e-3).x, dt=1e-3)[0.2:]
     costs = [
         pt.identify(
-            log, "preisach", least_squares=LeastSquares(count=count, creep=False, dynamics=None)
+            log, "preisach", method=LeastSquares(count=count, creep=False, dynamics=None)
         ).cost
         for count in (3, 6, 12)
     ]
@@ -150,7 +150,7 @@ def test_settings_of_other_models_are_refused() -> None:
         ("preisach", LeastSquares(dead_zones=2), "no dead zones"),
     ):
         with pytest.raises(pt.ParameterError, match=match):
-            pt.identify(log, model, least_squares=settings)
+            pt.identify(log, model, method=settings)
 
 
 def test_it_explains_a_measured_log_and_foretells_another(tmp_path: Path) -> None:

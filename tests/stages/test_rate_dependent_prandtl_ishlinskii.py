@@ -119,17 +119,15 @@ def test_records_at_three_rates_determine_it() -> None:
     settings = pt.identification.LeastSquares(
         thresholds=STAGE.thresholds, dead_zones=False, creep=False, dynamics=None
     )
-    asked = {"history": "virgin", "drift": False, "least_squares": settings}
-    fit = pt.identify(logs, KIND, **asked)  # type: ignore[arg-type]
+    asked: dict[str, Any] = {"history": "virgin", "drift": False, "method": settings}
+    fit = pt.identify(logs, KIND, **asked)
     assert fit.model.dilation == pytest.approx(STAGE.dilation, rel=0.01)
     assert fit.model.weights == pytest.approx(STAGE.weights, rel=0.02)
     assert fit.cost == pytest.approx(NOISE, rel=0.05)
     # Without rate dependence the three contradict each other, with a lag too.
-    plain = pt.identify(logs, "prandtl-ishlinskii", **asked)  # type: ignore[arg-type]
+    plain = pt.identify(logs, "prandtl-ishlinskii", **asked)
     late = replace(settings, dynamics="first")
-    lagging = pt.identify(
-        logs, "prandtl-ishlinskii", history="virgin", drift=False, least_squares=late
-    )
+    lagging = pt.identify(logs, "prandtl-ishlinskii", history="virgin", drift=False, method=late)
     assert plain.cost > lagging.cost > 10.0 * fit.cost
     # And foretells a rate that it was not fitted to.
     other = record(4.0, 7)

@@ -162,10 +162,8 @@ def test_its_log_can_be_identified() -> None:
     fit = pt.identify(
         log,
         "dahl",
-        fixed=HELD,
-        bounds=BOX,
-        swarm=pt.ParticleSwarm(particles=12, iterations=60),
-        seed=1,
+        parameters={**BOX, **HELD},
+        method=pt.ParticleSwarm(particles=12, iterations=60, seed=1),
     )
     assert fit.fitted.max_error < 5e-6
     assert STAGE.record(log.u, log.dt, hold="zoh").hold == "zoh"

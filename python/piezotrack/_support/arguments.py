@@ -104,7 +104,9 @@ def finite(name: str, value: object, unit: str) -> float:
     """
     number = _core.as_number(name, value)
     if not math.isfinite(number):
-        raise ParameterError(f"{name} is {number}: expected a finite number, in {unit}")
+        raise ParameterError(
+            f"{name} is {number}: expected a finite number, in {unit}", argument=name
+        )
     return number
 
 
@@ -118,7 +120,9 @@ def positive(name: str, value: object, unit: str) -> float:
     """
     number = _core.as_number(name, value)
     if not 0.0 < number < math.inf:
-        raise ParameterError(f"{name} is {number:g}: expected a finite number above 0, in {unit}")
+        raise ParameterError(
+            f"{name} is {number:g}: expected a finite number above 0, in {unit}", argument=name
+        )
     return number
 
 
@@ -132,7 +136,9 @@ def hertz(name: str, value: object) -> float:
     """
     number = positive(name, value, "Hz")
     if not SLOWEST <= number <= FASTEST:
-        raise ParameterError(f"{name} is {number:g} Hz: expected {SLOWEST:g} to {FASTEST:g} Hz")
+        raise ParameterError(
+            f"{name} is {number:g} Hz: expected {SLOWEST:g} to {FASTEST:g} Hz", argument=name
+        )
     return number
 
 
@@ -158,7 +164,9 @@ def in_range(name: str, value: object, highest: float, unit: str) -> float:
     number = _core.as_number(name, value)
     if not 0.0 <= number <= highest or number == math.inf:
         end = f"from 0 to {highest:g}" if highest < math.inf else "of 0 or above"
-        raise ParameterError(f"{name} is {number:g}: expected a finite number {end}, in {unit}")
+        raise ParameterError(
+            f"{name} is {number:g}: expected a finite number {end}, in {unit}", argument=name
+        )
     return number
 
 
@@ -218,12 +226,14 @@ def numbers(
     entries = _entries(name, values) if several else [values]  # type: ignore[arg-type]
     array = np.array([_core.as_number(name, value) for value in entries])
     if array.size < least:
-        raise ParameterError(f"{name} has {array.size} entries: expected at least {least}")
+        raise ParameterError(
+            f"{name} has {array.size} entries: expected at least {least}", argument=name
+        )
     for number in array:
         if not (math.isfinite(number) and number > above):
             limit = "" if above == -math.inf else f" above {above:g}"
             raise ParameterError(
-                f"{name} has {number:g}: expected finite numbers{limit}, in {unit}"
+                f"{name} has {number:g}: expected finite numbers{limit}, in {unit}", argument=name
             )
     return array
 
@@ -269,7 +279,9 @@ def as_numbers(name: str, values: object) -> tuple[float, ...]:
     (1.0, 2.5)
     """
     if not has_entries(values):
-        raise ParameterError(f"{name} is {quoted(values)}: expected numbers in a list")
+        raise ParameterError(
+            f"{name} is {quoted(values)}: expected numbers in a list", argument=name
+        )
     entries = _entries(name, values)
     return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(entries))
 
@@ -278,7 +290,9 @@ def _entries(name: str, values: Iterable[object]) -> list[object]:
     """Return the entries of a list of settings, of which there are never many."""
     entries = list(islice(values, MOST_ENTRIES + 1))
     if len(entries) > MOST_ENTRIES:
-        raise ParameterError(f"{name} has more entries: expected {MOST_ENTRIES} at most")
+        raise ParameterError(
+            f"{name} has more entries: expected {MOST_ENTRIES} at most", argument=name
+        )
     return entries
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import ParameterError
 from ..identification.fit import identify
-from ..identification.solve.selection import AUTO
+from ..identification.problem.problem import AUTO
 from ..references.reference import Reference
 from ..stages.registry import MODELS
 from .contender import Contender

@@ -13,7 +13,7 @@ from .._support.messages import quoted
 from ..data.dataset import Dataset
 from ..errors import ParameterError
 from ..identification.comparison.parts import parts_of
-from ..identification.problem.fingerprint import key_of, record_key
+from ..identification.problem.fingerprint import hash_of, record_hash
 
 __all__ = ["BenchmarkRecord", "checked_name"]
 
@@ -198,8 +198,8 @@ class BenchmarkRecord:
     @property
     def key(self) -> str:
         """Hash of all parts: another one where a sample or a window is another."""
-        parts: list[Any] = [[part, record_key(data)] for part, data in self.parts()]
-        return key_of([parts, self.own_offsets])
+        parts: list[Any] = [[part, record_hash(data)] for part, data in self.parts()]
+        return hash_of([parts, self.own_offsets])
 
     def document(self) -> dict[str, Any]:
         """Content of a result's file about the record.

@@ -19,6 +19,7 @@ from .fit_options import (
     Delay,
     Drift,
     Dynamics,
+    FitOptions,
     Fix,
     Free,
     History,
@@ -30,8 +31,8 @@ from .fit_options import (
     Scales,
     Swarm,
     Ties,
+    delay_asked,
     drift_asked,
-    fit_options,
     searched,
 )
 from .interruption import heard
@@ -139,7 +140,7 @@ def campaign_command(
     can_be_folder(out)
     if parquet:
         check_parquet()
-    given: dict[str, Any] = fit_options(
+    options = FitOptions(
         free=free,
         fix=fix,
         bound=bound,
@@ -147,17 +148,26 @@ def campaign_command(
         tie=tie,
         constrain=constrain,
         prior=prior,
-        delay=delay,
+        stiffness=stiffness,
         creep=creep,
         plays=plays,
         asymmetry=asymmetry,
         dynamics=dynamics,
         method=method,
         swarm=swarm,
+        runs=runs,
     )
-    given |= {"stiffness": stiffness, "offset": offset, "history": history, "runs": runs}
-    given["drift"] = None if drift is None else drift_asked(drift)
-    models = {kind: {"model": kind, **kinds.arguments_of(kind, given)} for kind in kinds.names}
+    options.check()
+    kinds.refuse_of_others(context)
+    of_record = {
+        "offset": offset,
+        "delay": delay_asked(delay),
+        "drift": None if drift is None else drift_asked(drift),
+        "history": history,
+    }
+    models = {
+        kind: {"model": kind, **of_record, **options.arguments_of(kind)} for kind in kinds.names
+    }
     numbers = _seeds(seeds)
     columns = Columns(time, drive, displacement, unit, dt)
     logs = {

@@ -11,6 +11,7 @@ from ..control.running.track import track
 from ..data import datasets
 from ..data.dataset import Dataset
 from ..identification.fit import identify
+from ..identification.methods.descents import Descents
 from ..references.waveforms import triangle
 from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
@@ -100,7 +101,7 @@ def run_demo(seed: int = 1, *, progress: bool | None = None) -> Demonstration:
         The model, its score, and the runs.
     """
     log, other = demo_logs()
-    fit = identify(log[slice(*WINDOW)], seed=seed, progress=progress)
+    fit = identify(log[slice(*WINDOW)], method=Descents(seed=seed), progress=progress)
     later = other[WINDOW[0] :]
     plant = VirtualStage.of(identify(later, "prandtl-ishlinskii"), noise=NOISE, seed=seed)
     reference = triangle(frequency=1.0, low=5e-6, high=42e-6, duration=4.0)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 
@@ -13,9 +13,15 @@ from ..stages.model_info import LISTED
 from .options import number, number_range, pairs, refuse_without_effect
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
+    from ..data.dataset import Dataset
+    from ..identification.methods.choice import Method as OneMethod
+    from ..identification.methods.choice import Search
+    from ..identification.methods.least_squares import LeastSquares
     from ..identification.methods.particle_swarm import ParticleSwarm
+    from ..identification.problem.parameter import Parameter
+    from ..identification.problem.records import Record
 
 __all__ = [
     "AUTO",
@@ -27,6 +33,7 @@ __all__ = [
     "Delays",
     "Drifts",
     "Dynamics",
+    "FitOptions",
     "Fix",
     "Free",
     "Histories",
@@ -41,13 +48,17 @@ __all__ = [
     "Ties",
     "Weights",
     "Windows",
+    "check_each_log",
+    "delay_asked",
+    "drift_asked",
     "each_of",
-    "fit_options",
     "of_each_log",
     "searched",
 ]
 
 AUTO = "auto"
+
+T = TypeVar("T")
 
 KindsNamed = Annotated[
     list[str] | None,
@@ -228,6 +239,9 @@ Swarm = Annotated[
 
 # How a search alone is run.
 RUNNING = ("seed", "runs")
+# Options on the parameters of one model, and others of models that are searched.
+OF_ONE_MODEL = ("free", "fix", "bound", "scale", "tie", "constrain", "prior")
+OF_SEARCH = (*OF_ONE_MODEL, "stiffness", "method", "swarm")
 # Options of least squares.
 OF_PLAYS = ("plays", "asymmetry", "dynamics")
 # The library's words for the dynamics.
@@ -271,18 +285,17 @@ class Kinds:
                 context, OF_PLAYS, "with --stiffness, for which a search is needed"
             )
 
-    def arguments_of(self, name: str, given: Mapping[str, Any]) -> dict[str, Any]:
-        """Arguments of `identify` for one of the kinds, without those of the others only."""
-        arguments = {key: value for key, value in given.items() if value is not None}
-        if not _of_plays(name):
-            arguments.pop("least_squares", None)
-        elif not searched(name):
-            # Its creep is a setting of the least squares.
-            arguments.pop("creep", None)
-        if not searched(name) and any(map(searched, self.names)):
-            for key in RUNNING:
-                arguments.pop(key, None)
-        return arguments
+    def refuse_of_others(self, context: typer.Context) -> None:
+        """Refuse options that one of the kinds does not have."""
+        for name in self.names:
+            if name == AUTO:
+                reason = (
+                    "with --model auto: name the model whose parameters these are, as --model dahl"
+                )
+                refuse_without_effect(context, OF_ONE_MODEL, reason)
+            elif not searched(name):
+                reason = f"with the model {name}, whose parameters follow by least squares"
+                refuse_without_effect(context, OF_SEARCH, reason)
 
 
 def searched(name: str) -> bool:
@@ -294,60 +307,148 @@ def _of_plays(name: str) -> bool:
     return name == AUTO or not LISTED[name].searched
 
 
-def fit_options(
-    *,
-    free: str | None,
-    fix: list[str] | None,
-    bound: list[str] | None,
-    scale: list[str] | None,
-    tie: list[str] | None,
-    constrain: list[str] | None,
-    prior: list[str] | None,
-    delay: str | None,
-    creep: str | None,
-    plays: int | None,
-    asymmetry: int | None,
-    dynamics: str | None,
-    method: str | None,
-    swarm: str | None,
-) -> dict[str, Any]:
-    """Parse the options of a fit; None stands for what was not given."""
-    relaxations = _creep(creep)
-    return {
-        "free": None if free is None else [name.strip() for name in free.split(",")],
-        "fixed": {name: number("--fix", text) for name, text in pairs("--fix", fix)} or None,
-        "bounds": {name: number_range("--bound", text) for name, text in pairs("--bound", bound)}
-        or None,
-        "scales": dict(pairs("--scale", scale)) or None,
-        "ties": dict(pairs("--tie", tie)) or None,
-        "constraints": constrain or None,
-        "priors": {name: _prior(text) for name, text in pairs("--prior", prior)} or None,
-        "delay": _delay(delay),
-        "creep": relaxations,
-        "least_squares": _least_squares(plays, asymmetry, dynamics, relaxations),
-        "method": method,
-        "swarm": _swarm(swarm),
-    }
+@dataclass(frozen=True, kw_only=True)
+class FitOptions:
+    """Options of a fit, as they are typed; None stands for what was not given."""
+
+    free: str | None
+    fix: list[str] | None
+    bound: list[str] | None
+    scale: list[str] | None
+    tie: list[str] | None
+    constrain: list[str] | None
+    prior: list[str] | None
+    stiffness: float | None
+    creep: str | None
+    plays: int | None
+    asymmetry: int | None
+    dynamics: str | None
+    method: Literal["descents", "swarm"] | None
+    swarm: str | None
+    seed: int | None = None
+    runs: int | None
+
+    def check(self) -> None:
+        """Parse all of them, before the first model is identified."""
+        self.parameters()
+        _creep(self.creep)
+        _ = self._swarm, self._least_squares
+
+    def arguments_of(self, kind: str) -> dict[str, Any]:
+        """Arguments of `identify` for one of the kinds, without those of the others only."""
+        parameters = self.parameters()
+        if self.free is not None and kind != AUTO:
+            self._check_free(kind, parameters)
+        arguments = {
+            "parameters": parameters,
+            "constraints": self.constrain,
+            # That of least squares is a setting of the method.
+            "creep": _creep(self.creep) if searched(kind) else None,
+            "method": self._methods(kind),
+        }
+        return {name: value for name, value in arguments.items() if value not in (None, {}, [])}
+
+    def parameters(self) -> dict[str, Parameter]:
+        """Return what is said of each parameter."""
+        from ..identification.problem.parameter import Parameter
+
+        given: dict[str, dict[str, Any]] = {}
+        for option, texts, what in (
+            # Priors first: their order is that in which they are summed.
+            ("--prior", self.prior, "prior"),
+            ("--fix", self.fix, "value"),
+            ("--bound", self.bound, "bounds"),
+            ("--scale", self.scale, "scale"),
+            ("--tie", self.tie, "tie"),
+        ):
+            for name, text in pairs(option, texts):
+                given.setdefault(name, {})[what] = PARSERS[what](option, text)
+        if self.stiffness is not None:
+            said = given.setdefault("stiffness", {})
+            if "value" in said and said["value"] != self.stiffness:
+                raise ParameterError(
+                    f"--stiffness is {self.stiffness:g}: expected the value given for it by --fix, "
+                    "or only one of the two"
+                )
+            said["value"] = self.stiffness
+        for name in self._free:
+            if "value" in given.setdefault(name, {}):
+                raise ParameterError(
+                    f"--free is {name}: expected a parameter that is not fixed as well"
+                )
+            if "tie" in given[name]:
+                raise ParameterError(f"--free is {name}: expected a parameter that is not tied")
+        return {name: Parameter(**said) for name, said in given.items()}
+
+    @property
+    def _free(self) -> list[str]:
+        return [] if self.free is None else [name.strip() for name in self.free.split(",")]
+
+    def _check_free(self, kind: str, parameters: Mapping[str, Parameter]) -> None:
+        """Refuse names of no parameter, and others that are not searched and have no value."""
+        infos = [one for one in LISTED[kind].parameters if not one.is_list]
+        names = [one.name for one in infos]
+        for name in self._free:
+            if name not in names:
+                raise ParameterError(f"--free is '{name}': expected one of {', '.join(names)}")
+        for one in infos:
+            said = parameters.get(one.name)
+            has_value = said is not None and (said.value is not None or said.tie is not None)
+            # The stiffness may be nominal.
+            nominal = one.name == "stiffness" and one.carries_force
+            if not (one.name in self._free or has_value or nominal or one.default is not None):
+                raise ParameterError(
+                    f"--free is {', '.join(self._free)}: expected {one.name} as well, or a value "
+                    "for it by --fix"
+                )
+
+    def _methods(self, kind: str) -> list[OneMethod] | None:
+        """Return what searches, and the settings of least squares, where they are given."""
+        search = self._search(kind) if searched(kind) else None
+        weights = self._least_squares if _of_plays(kind) else None
+        return [one for one in (search, weights) if one is not None] or None
+
+    def _search(self, kind: str) -> Search | None:
+        from ..identification.methods.choice import ITERATIONS
+        from ..identification.methods.descents import Descents
+        from ..identification.methods.particle_swarm import ParticleSwarm
+
+        swarm = self._swarm
+        if self.method == "descents" and swarm is not None:
+            raise ParameterError("--swarm is given with --method descents: expected one of them")
+        running = {"seed": self.seed, "runs": self.runs}
+        given: dict[str, Any] = {
+            name: value for name, value in running.items() if value is not None
+        }
+        if swarm is not None:
+            return replace(swarm, **given)
+        if self.method == "swarm":
+            if kind == AUTO:
+                given["iterations"] = ITERATIONS
+            return ParticleSwarm(**given)
+        return Descents(**given) if given or self.method else None
+
+    @property
+    def _least_squares(self) -> LeastSquares | None:
+        from ..identification.methods.least_squares import LeastSquares
+
+        settings: dict[str, Any] = {}
+        if self.plays is not None:
+            settings["count"] = self.plays
+        if self.asymmetry is not None:
+            settings["dead_zones"] = self.asymmetry
+        if self.dynamics is not None:
+            settings["dynamics"] = DYNAMICS[self.dynamics]
+        if (creep := _creep(self.creep)) is not None:
+            settings["creep"] = creep
+        return LeastSquares(**settings) if settings else None
+
+    @property
+    def _swarm(self) -> ParticleSwarm | None:
+        return None if self.swarm is None else _swarm_named(self.swarm)
 
 
-def _least_squares(
-    plays: int | None, asymmetry: int | None, dynamics: str | None, creep: bool | list[float] | None
-) -> Any:
-    from ..identification.methods.least_squares import LeastSquares
-
-    settings: dict[str, Any] = {}
-    if plays is not None:
-        settings["count"] = plays
-    if asymmetry is not None:
-        settings["dead_zones"] = asymmetry
-    if dynamics is not None:
-        settings["dynamics"] = DYNAMICS[dynamics]
-    if creep is not None:
-        settings["creep"] = creep
-    return LeastSquares(**settings) if settings else None
-
-
-def _swarm(name: str | None) -> ParticleSwarm | None:
+def _swarm_named(name: str) -> ParticleSwarm:
     from ..identification.methods.particle_swarm import ParticleSwarm
 
     known = {
@@ -355,28 +456,75 @@ def _swarm(name: str | None) -> ParticleSwarm | None:
         "xu-li-2010": ParticleSwarm.xu_li_2010(),
         "spso-2011": ParticleSwarm.spso_2011(),
     }
-    if name is None:
-        return None
     if name not in known:
         raise ParameterError(f"--swarm is '{name}': expected {', '.join(known)}")
     return known[name]
 
 
-def _prior(text: str) -> tuple[float, float]:
+def _prior(option: str, text: str) -> tuple[float, float]:
     value, colon, width = text.partition(":")
     if not colon:
-        raise ParameterError(f"--prior has '{text}': expected VALUE:WIDTH")
-    return number("--prior", value), number("--prior", width)
+        raise ParameterError(f"{option} has '{text}': expected VALUE:WIDTH")
+    return number(option, value), number(option, width)
+
+
+def _text(_option: str, text: str) -> str:
+    return text
+
+
+PARSERS: dict[str, Callable[[str, str], Any]] = {
+    "prior": _prior,
+    "value": number,
+    "bounds": number_range,
+    "scale": _text,
+    "tie": _text,
+}
 
 
 def of_each_log(
+    logs: Sequence[Dataset],
+    *,
+    offset: bool,
     delay: list[str] | None,
     drift: list[str] | None,
     history: list[str] | None,
     weight: list[float] | None,
+) -> list[Record]:
+    """Put with each of several logs what is said of it; one value stands for all of them."""
+    from ..identification.problem.records import Record, label_of, of_record
+
+    count = len(logs)
+    given = zip(
+        each_of("--delay", delay, count),
+        each_of("--drift", drift, count),
+        each_of("--history", history, count),
+        each_of("--weight", weight, count),
+        strict=True,
+    )
+    records = []
+    for i, (log, (late, drifting, before, counts)) in enumerate(zip(logs, given, strict=True)):
+        with of_record(label_of(log, i) if count > 1 else ""):
+            record = Record(
+                log,
+                offset=offset,
+                delay=delay_asked(late),
+                drift=None if drifting is None else drift_asked(drifting),
+                history=before,  # type: ignore[arg-type]
+                weight=1.0 if counts is None else counts,
+            )
+        records.append(record)
+    return records
+
+
+def check_each_log(
     count: int,
-) -> dict[str, Any]:
-    """Parse what may be said of each of several logs; one value stands for all of them."""
+    *,
+    delay: list[str] | None,
+    drift: list[str] | None,
+    history: list[str] | None,
+    weight: list[float] | None,
+) -> None:
+    """Refuse what may be said of each of several logs, before they are read."""
     for option, given in (
         ("--delay", delay),
         ("--drift", drift),
@@ -386,17 +534,13 @@ def of_each_log(
         check_count(option, given, count)
     if weight and count == 1:
         raise ParameterError("--weight has no effect with 1 log: expected it left out")
-    delays = [_delay(text) for text in delay or []]
-    drifts = [drift_asked(text) for text in drift or []]
-    return {
-        "delay": delays if len(delays) > 1 else next(iter(delays), None),
-        "drift": drifts if len(drifts) > 1 else next(iter(drifts), None),
-        "history": history if history and len(history) > 1 else next(iter(history or []), None),
-        "weights": None if not weight else weight * count if len(weight) == 1 else weight,
-    }
+    for text in delay or []:
+        delay_asked(text)
+    for text in drift or []:
+        drift_asked(text)
 
 
-def each_of(option: str, given: list[str] | None, count: int) -> list[str | None]:
+def each_of(option: str, given: Sequence[T] | None, count: int) -> list[T | None]:
     """Return an option for each of several logs: given once for all, or once for each."""
     if given is None or len(given) in (0, 1):
         return [given[0] if given else None] * count
@@ -413,7 +557,8 @@ def check_count(option: str, given: Sequence[object] | None, count: int) -> None
         )
 
 
-def _delay(text: str | None) -> bool | float | tuple[float, float] | None:
+def delay_asked(text: str | None) -> bool | float | tuple[float, float] | None:
+    """Parse what is said of the delay of a log."""
     if text is None or text == "fit":
         return None if text is None else True
     if ":" in text:
@@ -422,7 +567,7 @@ def _delay(text: str | None) -> bool | float | tuple[float, float] | None:
 
 
 def drift_asked(text: str) -> bool | float:
-    """Parse what is asked of the drift of a log."""
+    """Parse what is said of the drift of a log."""
     if text in ("fit", "none"):
         return text == "fit"
     return number("--drift", text, "none, fit, or a number of seconds, the time constant")

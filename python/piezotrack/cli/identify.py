@@ -20,6 +20,7 @@ from .fit_options import (
     Delays,
     Drifts,
     Dynamics,
+    FitOptions,
     Fix,
     Free,
     Histories,
@@ -34,8 +35,8 @@ from .fit_options import (
     Ties,
     Weights,
     Windows,
+    check_each_log,
     each_of,
-    fit_options,
     of_each_log,
     searched,
 )
@@ -60,11 +61,12 @@ from .options import (
 from .output import Output
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
 
     from ..data.dataset import Dataset
     from ..identification.fitted.identification import Identification
     from ..identification.fitted.score import Score
+    from ..identification.problem.records import Record
 
 __all__ = ["identify_command"]
 
@@ -134,7 +136,7 @@ def identify_command(
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    given = fit_options(
+    options = FitOptions(
         free=free,
         fix=fix,
         bound=bound,
@@ -142,17 +144,19 @@ def identify_command(
         tie=tie,
         constrain=constrain,
         prior=prior,
-        delay=None,
+        stiffness=stiffness,
         creep=creep,
         plays=plays,
         asymmetry=asymmetry,
         dynamics=dynamics,
         method=method,
         swarm=swarm,
+        seed=seed,
+        runs=runs,
     )
-    given |= {"stiffness": stiffness, "offset": offset}
-    given |= of_each_log(delay, drift, history, weight, len(files))
-    given |= {"seed": seed, "runs": runs, "threads": threads, "progress": result.progress}
+    options.check()
+    kinds.refuse_of_others(context)
+    check_each_log(len(files), delay=delay, drift=drift, history=history, weight=weight)
     if checkpoint is not None and len(kinds.names) > 1:
         raise ParameterError("--checkpoint is given with several models: expected one")
     columns = Columns(time, drive, displacement, unit, dt)
@@ -167,13 +171,24 @@ def identify_command(
     if validate is not None:
         whole = columns.read(validate, hold, resample)
         second = windowed(whole, validate, "--validate-window", validate_window)
-    result.will_write(_files(kinds, logs, given, validated=second is not None))
+    records = of_each_log(
+        logs, offset=offset, delay=delay, drift=drift, history=history, weight=weight
+    )
+    result.will_write(_files(kinds, logs, options, validated=second is not None))
     words: list[str] = []
     documents: list[dict[str, Any]] = []
     written: list[Path] = []
     for kind in kinds.names:
         with nullcontext() if len(files) > 1 else of_file(files[0]):
-            fit = _search(logs, out, kind, **kinds.arguments_of(kind, given), checkpoint=checkpoint)
+            fit = _search(
+                records,
+                out,
+                kind,
+                **options.arguments_of(kind),
+                threads=threads,
+                progress=result.progress,
+                checkpoint=checkpoint,
+            )
         fit, score = _judged(fit, second)
         written += _write(fit, out, second)
         # The result is complete: remove the file of an interrupted search.
@@ -189,16 +204,16 @@ def identify_command(
 
 
 def _files(
-    kinds: Kinds, logs: list[Dataset], given: Mapping[str, Any], *, validated: bool
+    kinds: Kinds, logs: list[Dataset], options: FitOptions, *, validated: bool
 ) -> Iterator[str]:
     """Names of all files that the command may write."""
     from .._support.files import picture_files
-    from ..identification.solve.selection import kinds_tried
+    from ..identification.solve.selection import models_tried
     from ..identification.views.report import identification_files
 
     names = [name for name in kinds.names if name != AUTO]
     if AUTO in kinds.names:
-        names += [kind.name for kind in kinds_tried(logs[0], given)]
+        names += [kind.name for kind in models_tried(logs[0], options.parameters())]
     for name in dict.fromkeys(names):
         yield from identification_files(name, searched=searched(name), records=len(logs))
         if validated:
@@ -210,13 +225,13 @@ def _partial(model: str) -> str:
     return f"{model}.partial.json"
 
 
-def _search(logs: list[Dataset], out: Path, kind: str, **arguments: Any) -> Identification:
+def _search(records: list[Record], out: Path, kind: str, **arguments: Any) -> Identification:
     """Identify; on Ctrl-C save the best model found so far."""
     from .._support.files import make_folder
     from ..identification.fit import identify
 
     try:
-        return identify(logs[0] if len(logs) == 1 else logs, kind, **arguments)
+        return identify(records[0] if len(records) == 1 else records, kind, **arguments)
     except Interrupted as stopped:
         heard()
         if stopped.partial is None:

@@ -69,7 +69,7 @@ def check_record(data: Dataset, *, searches_hysteresis: bool) -> None:
         raise DataError(
             f"the drive never reverses: it goes from {_drive(data, whole.u[0])} to "
             f"{_drive(data, whole.u[-1])} and never back, where hysteresis does not show; record a "
-            "drive that goes up and down, or hold the parameters of the hysteresis with fixed="
+            "drive that goes up and down, or hold the parameters of the hysteresis in parameters="
         )
 
 

@@ -37,4 +37,6 @@ from .methods.descents import Descents as Descents
 from .methods.least_squares import LeastSquares as LeastSquares
 from .methods.particle_swarm import ParticleSwarm as ParticleSwarm
 from .problem.objective import Objective as Objective
-from .solve.likely_models import likely_models as likely_models
+from .problem.parameter import Parameter as Parameter
+from .problem.records import Record as Record
+from .solve.posterior_models import posterior_models as posterior_models

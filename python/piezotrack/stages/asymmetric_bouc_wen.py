@@ -52,7 +52,7 @@ class AsymmetricBoucWenStage(Stage):
         delta while it falls.
     sign_asymmetry : float, optional
         epsilon [1/V]: it decays faster by epsilon where h is above 0, and more slowly by epsilon
-        where it is below 0. A search holds it at 0 unless it is in ``free=``.
+        where it is below 0. A search holds it at 0 unless something is said of it.
     creep_weights : sequence of float, optional
         c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
     creep_times : sequence of float, optional

@@ -37,7 +37,7 @@ class BoucWenOscillator(Stage):
         Stiffness of the hysteresis for small motions [N/m].
     beta : float
         Factor of gamma and delta, not 0. The data determine only the two products, so `identify`
-        holds it: at 1, or at a value given by ``fixed=``.
+        holds it: at 1, or at a value given in ``parameters=``.
     gamma, delta : float
         Coefficients of the decay with abs(y'), which dissipates, and with y', which does not
         [1/m; for another exponent 1/(m N^(nu-1))]. `BoucWenStage` has its hysteresis at the

@@ -85,11 +85,11 @@ class LuGreStage(Stage):
     that the force of sliding is Fs.
 
     For the same reason a search holds `micro_damping`, `static_ratio` and `stribeck_velocity`
-    unless they are in ``free=``. Where the force of sliding falls faster with the speed than the
-    damping grows, the stage sticks and slips, and a search among such motions finds nothing of use.
-    A micro damping far above the damping needs thousands of steps a sample, and one beside a mass
-    that is too small to show needs more steps than a search takes: free it for a record that shows
-    the resonance, with ``constraints=["micro_damping < damping"]``.
+    unless they are named in ``parameters=``. Where the force of sliding falls faster with the speed
+    than the damping grows, the stage sticks and slips, and a search among such motions finds
+    nothing of use. A micro damping far above the damping needs thousands of steps a sample, and one
+    beside a mass that is too small to show needs more steps than a search takes: free it for a
+    record that shows the resonance, with ``constraints=["micro_damping < damping"]``.
 
     Examples
     --------

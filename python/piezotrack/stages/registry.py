@@ -42,7 +42,9 @@ def model_named(name: object) -> ModelInfo:
             return model
     expected = ", ".join(repr(model.name) for model in MODELS)
     hint = "" if (near := _meant(name)) is None else f". Did you mean {near!r}?"
-    raise ParameterError(f"model is {quoted(name)}: expected one of {expected}{hint}")
+    raise ParameterError(
+        f"model is {quoted(name)}: expected one of {expected}{hint}", argument="model"
+    )
 
 
 def _meant(name: object) -> str | None:

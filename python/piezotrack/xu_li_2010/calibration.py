@@ -14,6 +14,7 @@ from .._support.two_threads import one_by_one, two_threads
 from ..control.loop.preconditions import check_stable
 from ..errors import PiezotrackError
 from ..identification.fit import identify
+from ..identification.methods.descents import Descents
 from ..identification.methods.particle_swarm import ParticleSwarm
 from ..stages.dahl import DahlStage
 from . import fig_04_step_test, fig_06_identification, fig_12_14_tracking, fig_15_circles
@@ -49,11 +50,14 @@ def values_of(apparatus: Apparatus) -> dict[str, float]:
     fit = identify(
         thin[:FITTED_SECONDS],
         "dahl",
-        fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
-        bounds=SEARCH_BOX,
+        parameters={
+            **SEARCH_BOX,
+            "a1": published.a1,
+            "a2": published.a2,
+            "b1": published.b1,
+        },
         history="virgin",
-        seed=SEED,
-        runs=1,
+        method=Descents(seed=SEED),
         threads=1,
         progress=False,
     )

@@ -11,6 +11,7 @@ from ..control.laws.pid import Pid
 from ..control.parts.repetitive import Repetitive
 from ..control.running.track import track
 from ..identification.fit import identify
+from ..identification.methods.descents import Descents
 from ..references.waveforms import sine
 from ..stages.dahl import DahlStage
 from ..stages.virtual import VirtualStage
@@ -75,9 +76,13 @@ def identify_demo(
     return identify(
         log[:FITTED_SECONDS],
         "dahl",
-        fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
-        bounds=SEARCH_BOX,
-        seed=seed,
+        parameters={
+            **SEARCH_BOX,
+            "a1": published.a1,
+            "a2": published.a2,
+            "b1": published.b1,
+        },
+        method=Descents(seed=seed),
         progress=progress,
         callback=callback,
     )

@@ -13,6 +13,7 @@ from ..control.timing import Timing
 from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
 from ..identification.fit import identify
+from ..identification.methods.descents import Descents
 from ..stages.dahl import DahlStage
 from . import fig_06_identification, fig_07_model_comparison, fig_12_14_tracking
 from .apparatus import DT, loop
@@ -268,10 +269,15 @@ def _largest_error(run: Tracking) -> list[str]:
 def rivals(data: Dataset) -> dict[str, Any]:
     """Fit the other models that have an inverse: a Bouc-Wen model and Prandtl-Ishlinskii."""
     plays = identify(data, "prandtl-ishlinskii")
-    free: dict[str, Any] = {"seed": 1, "history": "virgin", "threads": 1, "progress": False}
+    free: dict[str, Any] = {
+        "method": Descents(seed=1),
+        "history": "virgin",
+        "threads": 1,
+        "progress": False,
+    }
     name, bouc_wen = "Bouc-Wen", identify(data, "bouc-wen", **free)
     if abs(bouc_wen.model.gamma) > bouc_wen.model.beta:
         # Not passive, and therefore without an inverse.
         name = "Bouc-Wen, gamma held at 0 to have an inverse"
-        bouc_wen = identify(data, "bouc-wen", fixed={"gamma": 0.0}, **free)
+        bouc_wen = identify(data, "bouc-wen", parameters={"gamma": 0.0}, **free)
     return {name: bouc_wen, "Prandtl-Ishlinskii": plays}

@@ -44,12 +44,14 @@ def search(log: Dataset, seed: int) -> Identification:
     return identify(
         log[:FITTED_SECONDS],
         "dahl",
-        fixed={"a1": published.a1, "a2": published.a2, "b1": published.b1},
-        bounds=SEARCH_BOX,
+        parameters={
+            **SEARCH_BOX,
+            "a1": published.a1,
+            "a2": published.a2,
+            "b1": published.b1,
+        },
         history="virgin",
-        swarm=ParticleSwarm.xu_li_2010(),
-        seed=seed,
-        runs=3,
+        method=ParticleSwarm.xu_li_2010(seed=seed, runs=3),
         threads=1,
         progress=False,
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..identification.comparison.compare import Comparison, compare
 from ..identification.fit import identify
+from ..identification.methods.descents import Descents
 from ..stages.bouc_wen import BoucWenStage
 from .fig_06_identification import thinned
 from .procedure import FITTED_SECONDS
@@ -28,8 +29,7 @@ def judge(log: Dataset, fit: Identification, seed: int, *, every: int = 10) -> C
         thinned(log, every)[:FITTED_SECONDS],
         "bouc-wen",
         history="virgin",
-        seed=seed,
-        runs=4,
+        method=Descents(seed=seed, runs=4),
         threads=1,
         progress=False,
     )

@@ -17,6 +17,7 @@ import numpy as np
 from ..data.reader import read
 from ..errors import DataError
 from ..identification.fit import identify
+from ..identification.methods.descents import Descents
 from ..references.reference import Reference, read_reference
 from .extensions import rivals
 from .section import Section
@@ -139,7 +140,7 @@ def drives(folder: str | os.PathLike[str]) -> Drives:
     slope, level = np.polyfit(desired, measured, 1)
     line = float(slope) * desired + float(level)
     computed, fits, shifts = {}, {}, {}
-    dahl = identify(training, "dahl", seed=1, runs=2, progress=False)
+    dahl = identify(training, "dahl", method=Descents(seed=1, runs=2), progress=False)
     found: dict[str, Any] = {"Dahl": dahl, **rivals(training)}
     for name, fit in found.items():
         voltage = fit.inverse().voltage(reference, log.dt)[part]

@@ -1,8 +1,8 @@
 //! Conversion of the core's errors to piezotrack's exceptions, in one match.
 
 use piezotrack_core::Error;
-use pyo3::PyErr;
 use pyo3::exceptions::PyMemoryError;
+use pyo3::prelude::*;
 
 mod classes {
     pyo3::import_exception!(piezotrack.errors, ParameterError);
@@ -15,12 +15,19 @@ mod classes {
 pub fn raise(error: &Error) -> PyErr {
     let message = error.to_string();
     match error {
-        Error::Parameter { .. } => classes::ParameterError::new_err(message),
+        Error::Parameter { name, .. } => of_argument(name, message),
         Error::Shape { .. } => classes::ShapeError::new_err(message),
         Error::Data(_) => classes::DataError::new_err(message),
         Error::Numerical(_) => classes::NumericalError::new_err(message),
         Error::Memory { .. } => PyMemoryError::new_err(message),
     }
+}
+
+/// The exception for an argument, which it names.
+fn of_argument(name: &str, message: String) -> PyErr {
+    let error = classes::ParameterError::new_err(message);
+    let named = Python::attach(|py| error.value(py).setattr("argument", name));
+    named.err().unwrap_or(error)
 }
 
 /// The exception for an array of the wrong shape.

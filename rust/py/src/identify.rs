@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use numpy::PyArray1;
-use piezotrack_core::Result;
 use piezotrack_core::identify::{
     BEFORE, Coordinate, DELAY, DRIFT_TIME, History, Identification, Journal, Method, Outcome,
     OwnResult, Plan, Record, Relations, Spec, StopReason, identify_together, visited,
@@ -17,7 +16,7 @@ use crate::checkpoint::PyCheckpoint;
 use crate::descents::PyDescents;
 use crate::enter::{Watchers, enter_pool};
 use crate::errors::raise;
-use crate::question::{Asked, Question};
+use crate::problem::PyProblem;
 use crate::stage::hold;
 use crate::swarm::PySettings;
 
@@ -271,13 +270,13 @@ impl Searcher<'_> {
     }
 }
 
-/// Identifies a stage from records; None where the search was stopped before its first cost.
+/// Searches the parameters of a stage; None where the search was stopped before its first cost.
 #[pyfunction]
-#[pyo3(signature = (questions, *, method, seed, runs, threads, callback, progress, checkpoint))]
+#[pyo3(signature = (problem, *, method, seed, runs, threads, callback, progress, checkpoint))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify(
     py: Python<'_>,
-    questions: Vec<Question<'_>>,
+    problem: PyProblem<'_>,
     method: Searcher<'_>,
     seed: u64,
     runs: usize,
@@ -286,15 +285,14 @@ fn identify(
     progress: Option<Py<PyAny>>,
     checkpoint: Option<PyRef<'_, PyCheckpoint>>,
 ) -> PyResult<Option<PySearch>> {
-    let asked: Vec<Asked> = questions.into_iter().map(Question::asked).collect::<PyResult<_>>()?;
+    let question = problem.question()?;
     let plan = Plan { method: method.into_method(), seed, runs };
     let journal = checkpoint.map(|one| one.0.clone() as Arc<dyn Journal>);
     let watchers = Watchers { callback, progress, journal };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
-        let records: Vec<Record<'_>> = asked.iter().map(Asked::record).collect::<Result<_>>()?;
-        let all: Vec<&Record<'_>> = records.iter().collect();
-        let specs: Vec<Spec> = asked.iter().map(|one| one.spec(&all)).collect::<Result<_>>()?;
-        let together: Vec<(&Record<'_>, &Spec)> = records.iter().zip(&specs).collect();
+        let searched = question.searched()?;
+        let together: Vec<(&Record<'_>, &Spec)> =
+            searched.iter().map(|(record, spec)| (record, spec)).collect();
         identify_together(&together, &plan, monitor, stop)
     })?;
     Ok(found.best.map(|best| PySearch { outcome: found.runs[best].clone(), found }))

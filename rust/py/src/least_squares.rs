@@ -1,11 +1,10 @@
 //! Identification of a stage's weights by least squares.
 
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, History, LeastSquaresFit, PlacesKind, Record, RecordFit,
-    WeightsRecord, WeightsSettings, identify_weights, resonances,
+    CreepKind, DynamicsKind, LeastSquaresFit, PlacesKind, RecordFit, WeightsSettings,
+    identify_weights, resonances,
 };
 use piezotrack_core::math::{FREE, NOT_NEGATIVE, Rows};
-use piezotrack_core::models::Model;
 use piezotrack_core::signal::{Drive, Stop};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
@@ -14,7 +13,7 @@ use crate::arrays::samples;
 use crate::enter::{enter, enter_quiet_pool};
 use crate::errors::raise;
 use crate::models::{Named, named};
-use crate::question::{delay_between, drift_with};
+use crate::problem::{OneRecord, PyProblem};
 use crate::stage::hold;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -88,49 +87,6 @@ impl Own {
     }
 }
 
-/// A record and what is asked of it alone, from a dict of Python.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-struct Asked<'py> {
-    u: Bound<'py, PyAny>,
-    y: Bound<'py, PyAny>,
-    dt: f64,
-    hold_name: String,
-    start: usize,
-    history: Option<String>,
-    offset: bool,
-    /// Time constant of the drift, s; 0 for none, None for what the record shows.
-    drift: Option<f64>,
-    delay: Option<(f64, f64)>,
-    label: String,
-    weight: f64,
-}
-
-/// The same with its numbers out of Python.
-struct Samples {
-    u: Vec<f64>,
-    y: Vec<f64>,
-}
-
-impl Asked<'_> {
-    fn samples(&self) -> PyResult<Samples> {
-        Ok(Samples { u: samples("u", &self.u)?, y: samples("y", &self.y)? })
-    }
-
-    /// The record as the core takes it.
-    fn record<'a>(&self, of: &'a Samples) -> Result<WeightsRecord<'a>> {
-        let record = Record::new(&of.u, &of.y, self.dt, hold(&self.hold_name)?, self.start);
-        let Record { drive, y, weight, .. } =
-            record.map_err(|error| error.of(&self.label))?.among(&self.label, self.weight)?;
-        let history = self.history.as_deref().map(History::named).transpose()?;
-        let Self { start, offset, .. } = *self;
-        let drift = drift_with(self.drift);
-        let one =
-            WeightsRecord { history, offset, drift, weight, ..WeightsRecord::of(drive, y, start) };
-        one.delayed(delay_between(self.delay)).map_err(|error| error.of(&self.label))
-    }
-}
-
 fn dynamics_named(name: &str) -> Result<DynamicsKind> {
     match name {
         "none" => Ok(DynamicsKind::None),
@@ -144,16 +100,14 @@ fn dynamics_named(name: &str) -> Result<DynamicsKind> {
     }
 }
 
-/// Identifies a stage of a model from records; what is None is chosen.
+/// Identifies a stage by least squares; what is None is chosen.
 #[pyfunction]
-#[pyo3(name = "identify_weights", signature = (records, *, model, count, thresholds, zones,
-    creep_times, dynamics, threads))]
+#[pyo3(name = "identify_weights", signature = (problem, *, count, thresholds, zones, creep_times,
+    dynamics, threads))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
-#[expect(clippy::needless_pass_by_value, reason = "from Python")]
 fn fit_weights(
     py: Python<'_>,
-    records: Vec<Asked<'_>>,
-    model: &str,
+    problem: PyProblem<'_>,
     count: Option<usize>,
     thresholds: Option<Vec<f64>>,
     zones: usize,
@@ -161,10 +115,10 @@ fn fit_weights(
     dynamics: &str,
     threads: usize,
 ) -> PyResult<PyLeastSquaresFit> {
-    let numbers: Vec<Samples> = records.iter().map(Asked::samples).collect::<PyResult<_>>()?;
+    let question = problem.question()?;
     let checked = || -> Result<_> {
-        let both = records.iter().zip(&numbers);
-        let records: Result<Vec<_>> = both.map(|(one, numbers)| one.record(numbers)).collect();
+        let records: Result<Vec<_>> =
+            question.records.iter().map(OneRecord::weights_record).collect();
         let places = match (thresholds, count) {
             (Some(thresholds), _) => PlacesKind::Given(thresholds),
             (None, Some(count)) => PlacesKind::Spread(count),
@@ -172,10 +126,10 @@ fn fit_weights(
         };
         let creep = creep_times.map_or(CreepKind::Auto, CreepKind::Times);
         let dynamics = dynamics_named(dynamics)?;
-        Ok((Model::named(model)?, records?, WeightsSettings { places, zones, creep, dynamics }))
+        Ok((records?, WeightsSettings { places, zones, creep, dynamics }))
     };
-    let (model, asked, settings) = checked().map_err(|error| raise(&error))?;
-    let job = |stop: Stop<'_>| identify_weights(model, &asked, &settings, stop);
+    let (records, settings) = checked().map_err(|error| raise(&error))?;
+    let job = |stop: Stop<'_>| identify_weights(question.model, &records, &settings, stop);
     let fit = enter_quiet_pool(py, threads, job)?;
     // None means stopped, for which `enter_quiet_pool` has raised.
     fit.map(PyLeastSquaresFit)

@@ -16,7 +16,7 @@ mod models;
 mod numbers;
 mod objective;
 mod parts;
-mod question;
+mod problem;
 mod snapshots;
 mod stage;
 mod step;

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 
 use crate::enter::enter_quiet_pool;
 use crate::errors::raise;
-use crate::question::{Asked, Question};
+use crate::problem::{PyProblem, Question};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyObjective>()
@@ -19,7 +19,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 /// A record, what is asked of it, and how finely its candidates are stepped.
 #[pyclass(name = "Objective", frozen, module = "piezotrack._core")]
 pub struct PyObjective {
-    asked: Asked,
+    question: Question,
     problem: Problem,
     stepping: Stepping,
     threads: usize,
@@ -32,15 +32,17 @@ type Descended = (Vec<f64>, f64, usize);
 #[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
 impl PyObjective {
     #[new]
-    fn new(py: Python<'_>, question: Question<'_>, threads: usize) -> PyResult<Self> {
-        let asked = question.asked()?;
+    fn new(py: Python<'_>, problem: PyProblem<'_>, threads: usize) -> PyResult<Self> {
+        let question = problem.question()?;
         let (problem, stepping) = enter_quiet_pool(py, threads, |stop| {
-            let record = asked.record()?;
-            let problem = Problem::new(&record, &asked.spec(&[&record])?, stop)?;
-            let stepping = Evaluator::new(&record, &problem, stop).stepping;
+            let [(record, spec)] = &question.searched()?[..] else {
+                return Err(Error::parameter("data", "several records", "one record"));
+            };
+            let problem = Problem::new(record, spec, stop)?;
+            let stepping = Evaluator::new(record, &problem, stop).stepping;
             Ok((problem, stepping))
         })?;
-        Ok(Self { asked, problem, stepping, threads })
+        Ok(Self { question, problem, stepping, threads })
     }
 
     /// Name, bounds and scale of each coordinate.
@@ -113,7 +115,8 @@ impl PyObjective {
         job: impl FnOnce(&LocalRefinement<'_>, Stop<'_>) -> Result<T> + Send,
     ) -> PyResult<T> {
         enter_quiet_pool(py, self.threads, |stop| {
-            let record = self.asked.record()?;
+            let [one] = &self.question.records[..] else { unreachable!("checked by new") };
+            let record = one.record()?;
             let evaluator = Evaluator::stepped(&record, &self.problem, self.stepping);
             let records = Records::one(evaluator);
             job(&LocalRefinement { records: &records, stop }, stop)

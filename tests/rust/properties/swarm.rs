@@ -86,7 +86,7 @@ fn found(
     let record = Record::new(&u, &y, dt, Hold::First, 0).unwrap();
     let spec = Spec {
         bounds: vec![("damping".into(), (1e3, 5e3)), ("a1".into(), (10.0, 1e3))],
-        stiffness: Some(26065.0),
+        fixed: vec![("stiffness".into(), 26065.0)],
         offset: true,
         ..Spec::of(Model::Dahl)
     };

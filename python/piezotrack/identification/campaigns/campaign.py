@@ -11,12 +11,12 @@ from ..._support.arguments import has_entries
 from ..._support.messages import quoted
 from ...data.dataset import Dataset
 from ...errors import ParameterError
-from ..problem.fingerprint import record_key
-from ..solve.selection import AUTO
+from ..problem.fingerprint import record_hash
+from ..problem.problem import AUTO
 from .folder import CampaignFolder
 from .result import Campaign, TaskResult
 from .run import Planned, compute
-from .task import FAILURE, Task, is_searched, settings
+from .task import FAILURE, Task, problem_of, settings
 
 if TYPE_CHECKING:
     import os
@@ -47,9 +47,9 @@ def campaign(
     records : iterable of Dataset, or mapping of str to Dataset
         The records; with their titles, which are otherwise their sources.
     models : iterable of str, or mapping of str to mapping, optional
-        Kinds as for `identify`, ``"auto"`` among them; or the arguments of `identify` by title, as
-        ``{"two runs": {"model": "dahl", "runs": 2}}``. A title that is the name of a kind needs no
-        ``"model"``.
+        Names as for `identify`, ``"auto"`` among them; or the arguments of `identify` by title, as
+        ``{"two runs": {"model": "dahl", "method": pt.Descents(runs=2)}}``. A title that is the name
+        of a model needs no ``"model"``.
     seeds : iterable of int, optional
         Seeds of the random numbers.
     executor : concurrent.futures.Executor, optional
@@ -98,6 +98,14 @@ def campaign(
     """
     named = _records(records)
     wanted = _models(models)
+    solved = {
+        title: {model: problem_of(model, given, data) for model, given in wanted.items()}
+        for title, data in named.items()
+    }
+    of_models = {
+        model: settings(*problem) for model, problem in next(iter(solved.values())).items()
+    }
+    _refuse_alike(of_models)
     numbers = _seeds(seeds)
     if executor is not None and not isinstance(executor, Executor):
         hint = (
@@ -109,14 +117,14 @@ def campaign(
             f"executor is {quoted(executor)}: expected a concurrent.futures.Executor, as {hint}"
         )
     place = CampaignFolder(folder)
-    place.begin({record_key(data): (title, data) for title, data in named.items()}, wanted)
+    place.begin({record_hash(data): (title, data) for title, data in named.items()}, of_models)
     planned = [
         Planned(task, task.name, record, model)
-        for record, data in named.items()
-        for model, given in wanted.items()
+        for record, problems in solved.items()
+        for model, (problem, methods) in problems.items()
         for task in (
-            Task(record=data, settings=given, seed=seed)
-            for seed in (numbers if is_searched(given) else [None])
+            Task(problem=problem, methods=methods, seed=seed)
+            for seed in (numbers if problem.is_searched else [None])
         )
     ]
     found = {one.name: place.result(one.name) for one in planned}
@@ -161,7 +169,7 @@ def _records(records: object) -> dict[str, Dataset]:
     keys: dict[str, str] = {}
     sources = [data.source for _, data in pairs]
     for given, data in pairs:
-        key = record_key(data)
+        key = record_hash(data)
         title = given or _title(data, key, alone=sources.count(data.source) == 1)
         if key in keys:
             raise ParameterError(
@@ -181,32 +189,36 @@ def _title(data: Dataset, key: str, *, alone: bool) -> str:
     return data.source if alone else f"{data.source} {data.t[0]:.6g} to {data.t[-1]:.6g} s"
 
 
-def _models(models: object) -> dict[str, dict[str, Any]]:
-    """Check the models: settings by title."""
+def _models(models: object) -> dict[str, object]:
+    """Check the models: arguments of `identify` by title."""
     if not has_entries(models):
         raise ParameterError(f"models is {quoted(models)}: expected several in a list, as ['dahl']")
     if isinstance(models, Mapping):
-        named = {str(title): settings(str(title), given) for title, given in models.items()}
+        named = {str(title): given for title, given in models.items()}
     else:
         named = {}
         for name in models:
             if not isinstance(name, str):
                 raise ParameterError(
-                    f"models has {quoted(name)}: expected names of kinds, or a mapping of titles "
+                    f"models has {quoted(name)}: expected names of models, or a mapping of titles "
                     "to arguments of identify"
                 )
             if name in named:
                 raise ParameterError(f"models has '{name}' twice: expected it once")
-            named[name] = settings(name, {"model": name})
+            named[name] = {"model": name}
     if not named:
         raise ParameterError("models is empty: expected one or more")
-    titles = list(named)
+    return named
+
+
+def _refuse_alike(models: Mapping[str, dict[str, Any]]) -> None:
+    """Refuse the same settings under two titles."""
+    titles = list(models)
     for i, title in enumerate(titles):
-        if alike := [one for one in titles[:i] if named[one] == named[title]]:
+        if alike := [one for one in titles[:i] if models[one] == models[title]]:
             raise ParameterError(
                 f"models has the same settings as '{alike[0]}' and as '{title}': expected them once"
             )
-    return named
 
 
 def _seeds(seeds: object) -> list[int]:

@@ -23,7 +23,7 @@ __all__ = ["NAME", "CampaignFolder"]
 
 NAME = "campaign.json"
 FORMAT = "piezotrack-campaign"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 class CampaignFolder:

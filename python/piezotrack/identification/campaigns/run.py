@@ -234,7 +234,8 @@ def _nothing() -> None:
 
 def _size(one: Planned) -> int:
     """Bytes of a record: times, drive and displacement."""
-    return 24 * (len(one.task.record) + one.task.record.warmup)
+    (record,) = one.task.problem.records
+    return 24 * (len(record.data) + record.data.warmup)
 
 
 def _reason(error: Exception) -> str:

@@ -1,4 +1,4 @@
-"""A task of a campaign: one model, one record, one seed, as plain data and a plain function.
+"""A task of a campaign: one problem, one seed, as data that another process can compute.
 
 The name of a task is the hash of all that its result depends on. How many threads compute it, and
 where, is not part of that.
@@ -13,44 +13,35 @@ from typing import TYPE_CHECKING, Any
 from ... import _core
 from ..._support.messages import listed, quoted
 from ...errors import ExecutorError, ParameterError, PiezotrackError
-from ...stages.registry import model_named
-from ..fit import identify
-from ..fitted.drift import drift_of_asked
-from ..methods.descents import Descents
-from ..methods.least_squares import LeastSquares
-from ..methods.particle_swarm import ParticleSwarm
-from ..problem.fingerprint import exact, key_of, plain, record_key
-from ..problem.problem import delay_bounds
-from ..solve.one_model import refuse_given
-from ..solve.selection import AUTO
+from ..methods.choice import MethodChoice
+from ..problem.fingerprint import as_plain_data, exact_text, hash_of
+from ..problem.problem import AUTO, Problem
+from ..problem.records import records_of
+from ..solve.run import Run
+from ..solve.solution import solve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from ...data.dataset import Dataset
 
-__all__ = ["FAILURE", "SCHEMA_VERSION", "Task", "is_searched", "run_task", "settings"]
+__all__ = ["FAILURE", "SCHEMA_VERSION", "Task", "problem_of", "run_task", "settings"]
 
 # Format of the file of a task that found no model.
 FAILURE = "piezotrack-campaign-failure"
-SCHEMA_VERSION = 1
-# Arguments of `identify` that a model of a campaign may have.
-OF_PARAMETERS = ("free", "fixed", "bounds", "scales", "ties", "constraints", "priors")
-OF_SEARCH = ("stiffness", "creep", "method", "swarm", "descents", "runs")
-OF_SWARM = (*OF_PARAMETERS, *OF_SEARCH)
-OF_RECORDS = ("offset", "history", "delay", "drift")
-GIVEN = ("model", *OF_RECORDS, "least_squares", *OF_SWARM)
+SCHEMA_VERSION = 2
+# Arguments of `identify` that a model of a campaign may have, with those of the record.
+OF_RECORD = ("offset", "delay", "drift", "history")
+OF_PROBLEM = ("model", "parameters", "constraints", "creep")
+GIVEN = (*OF_PROBLEM, *OF_RECORD, "method")
 # And those that it has in another way.
 ELSEWHERE = {
-    "seed": "expected it in seeds=",
     "threads": "expected none, as the executor says how many tasks run at a time",
     "progress": "expected progress= of the campaign",
     "callback": "expected none, as a task may run on another machine",
     "checkpoint": "expected none, as the folder of the campaign keeps each result",
-    "initial": "expected its values in fixed=, as fixed=dict(step.hysteresis)",
     "data": "expected the record in records=",
 }
-SETTINGS = {"swarm": ParticleSwarm, "descents": Descents, "least_squares": LeastSquares}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,10 +50,10 @@ class Task:
 
     Attributes
     ----------
-    record : Dataset
-        The record.
-    settings : dict
-        Arguments of `identify` in numbers, texts, lists and dicts.
+    problem : Problem
+        The model and the record.
+    methods : MethodChoice
+        How it is solved.
     seed : int or None
         Seed of the random numbers; None for a model that least squares find.
     version : str
@@ -73,17 +64,23 @@ class Task:
         Hash of all of these but the threads.
     """
 
-    record: Dataset
-    settings: dict[str, Any]
+    problem: Problem
+    methods: MethodChoice
     seed: int | None
     version: str = _core.__version__
     threads: int = 1
 
     @property
     def name(self) -> str:
-        """Hash of record, settings, seed and version: 32 hexadecimal digits."""
+        """Hash of problem, method, seed and version: 32 hexadecimal digits."""
+        content = [*self.problem.content(), self.methods.settings(seed=False)]
         seed = None if self.seed is None else str(self.seed)
-        return key_of([record_key(self.record), exact(self.settings), seed, self.version])
+        return hash_of([exact_text(as_plain_data("task", content)), seed, self.version])
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings of problem and method in numbers, texts, lists and dicts, without defaults."""
+        return settings(self.problem, self.methods)
 
 
 def run_task(task: Task, stopped: Callable[[], bool] | None = None) -> dict[str, Any]:
@@ -113,15 +110,12 @@ def run_task(task: Task, stopped: Callable[[], bool] | None = None) -> dict[str,
         raise ExecutorError(
             f"a worker has piezotrack {_core.__version__}: expected {task.version}, as the caller"
         )
-    given = {
-        name: SETTINGS[name](**value) if name in SETTINGS else value
-        for name, value in task.settings.items()
-    }
-    if stopped is not None and is_searched(task.settings):
-        given["callback"] = lambda _: stopped()
+    callback = None if stopped is None or task.seed is None else lambda _: stopped()
+    run = Run(threads=task.threads, progress=False, callback=callback)
+    methods = task.methods if task.seed is None else task.methods.seeded(task.seed)
     entry = {"task": task.name, "seed": task.seed, "settings": task.settings}
     try:
-        fit = identify(task.record, seed=task.seed, threads=task.threads, progress=False, **given)
+        fit = solve(task.problem, methods, run)
     except (PiezotrackError, MemoryError) as error:
         return {
             "format": FAILURE,
@@ -133,70 +127,72 @@ def run_task(task: Task, stopped: Callable[[], bool] | None = None) -> dict[str,
     return {**fit.document(), "campaign": {**entry, "notes": fit.notes}}
 
 
-def is_searched(settings: Mapping[str, Any]) -> bool:
-    """Whether the result of these settings depends on the seed."""
-    return settings["model"] == AUTO or model_named(settings["model"]).searched
+def settings(problem: Problem, methods: MethodChoice) -> dict[str, Any]:
+    """Return the settings of a problem of one record and its method as plain data.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    methods : MethodChoice
+        The methods, whose seed is that of the task.
+
+    Returns
+    -------
+    dict
+        Of numbers, texts, lists and dicts, without defaults.
+    """
+    (of_record,) = problem.record_settings()
+    method = as_plain_data("method", methods.settings(seed=False))
+    return {**problem.settings(), **of_record, **({"method": method} if method else {})}
 
 
-def settings(title: str, given: object) -> dict[str, Any]:
+def problem_of(title: str, given: object, data: Dataset) -> tuple[Problem, MethodChoice]:
     """Check the arguments of `identify` that a model of a campaign has.
 
     Parameters
     ----------
     title : str
-        Title of the model; also its kind, where ``model`` is not among the arguments.
+        Title of the model; also its name, where ``model`` is not among the arguments.
     given : mapping
         The arguments.
+    data : Dataset
+        The record.
 
     Returns
     -------
-    dict
-        The same in numbers, texts, lists and dicts.
+    Problem, MethodChoice
+        The problem, and how it is solved.
 
     Raises
     ------
     ParameterError
-        There is no such kind, or an argument is none of `identify`, does not apply to the kind,
+        There is no such model, or an argument is none of `identify`, does not apply to the model,
         or is given to a campaign in another way.
     """
     if not isinstance(given, Mapping):
         raise ParameterError(
             f"models: '{title}' is {quoted(given)}: expected arguments of identify, as "
-            "{'model': 'dahl', 'runs': 2}"
+            "{'model': 'dahl', 'history': 'virgin'}"
         )
     for name in given:
         if name in ELSEWHERE:
             raise ParameterError(f"models: '{title}' has {name}: {ELSEWHERE[name]}")
         if name not in GIVEN:
             raise ParameterError(f"models: '{title}' has {quoted(name)}: expected {listed(GIVEN)}")
-    found = {name: value for name, value in given.items() if value is not None}
-    if found.get("offset") is True:
-        # As where it is not given.
-        del found["offset"]
+    model = given.get("model") or title
+    of_record = {"offset": True, **dict.fromkeys(OF_RECORD[1:])}
+    of_record |= {name: given[name] for name in OF_RECORD if given.get(name) is not None}
     try:
-        _check(found.setdefault("model", title), found)
-        return {name: plain(name, found[name]) for name in GIVEN if name in found}
-    except ParameterError as error:
-        raise ParameterError(f"models: '{title}': {error}") from None
-
-
-def _check(kind: object, found: Mapping[str, Any]) -> None:
-    """Refuse what `identify` would refuse for every record."""
-    for name, expected in SETTINGS.items():
-        if name in found and not isinstance(found[name], expected):
-            raise ParameterError(f"{name} is {quoted(found[name])}: expected {expected.__name__}")
-    delay_bounds(found.get("delay"))
-    drift_of_asked(found.get("drift"), offset=found.get("offset", True) is True, searched=False)
-    if "runs" in found:
-        _core.as_count("runs", found["runs"])
-    if kind == AUTO:
-        if of_one := [name for name in OF_PARAMETERS if name in found]:
+        records = records_of(data, **of_record)
+        of_stage = (given.get(name) for name in OF_PROBLEM[1:])
+        problem = Problem.checked(model, records, *of_stage)
+        methods = MethodChoice.of(given.get("method"), None if model == AUTO else problem.info)
+        if methods.search.seed:
             raise ParameterError(
-                f"{of_one[0]} is given with model='auto': expected the kind whose parameters "
-                "these are"
+                f"method has the seed {methods.search.seed}: expected it in seeds=",
+                argument="method",
             )
-        return
-    of_swarm = {**dict.fromkeys((*OF_SWARM, "seed", "threads")), **found}
-    for name in ("model", *OF_RECORDS, "least_squares"):
-        of_swarm.pop(name, None)
-    refuse_given(model_named(kind), of_swarm, found.get("least_squares"))
+    except ParameterError as error:
+        raise ParameterError(f"models: '{title}': {error}", argument="models") from None
+    return problem, methods

@@ -25,6 +25,8 @@ from ..fit import identify
 from ..fitted.identified_model import IdentifiedModel
 from ..fitted.model_entries import provenance
 from ..fitted.model_file import load
+from ..methods.descents import Descents
+from ..methods.least_squares import LeastSquares
 from .parts import parts_of
 
 if TYPE_CHECKING:
@@ -280,17 +282,19 @@ def compare(
         raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
     wanted = _wanted(models, data.drive_unit)
     first, second, carried = parts_of(data, train, test)
-    of_swarm: dict[str, Any] = {
-        "seed": seed,
-        "runs": runs,
-        "threads": threads,
-        "progress": progress,
-    }
+    method = (Descents(seed=seed, runs=runs), LeastSquares())
     rows = []
     for name, title, source in wanted:
         found: IdentifiedModel
         if isinstance(source, ModelInfo):
-            found = identify(first, source.name, history=history, **of_swarm)
+            found = identify(
+                first,
+                source.name,
+                history=history,
+                method=method,
+                threads=threads,
+                progress=progress,
+            )
         else:
             found = source
         rows.append(_compared(name, title, found, first, second, carried))

@@ -173,6 +173,11 @@ class StepResult(Result):
         """Time constant of the decay [s], equation (6)."""
         return self._mode[5]
 
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters that ``identify(parameters=)`` then holds: those of `hysteresis`."""
+        return self.hysteresis
+
     @cached_property
     def hysteresis(self) -> dict[str, float]:
         """The parameters a1, a2, b1 and b0 of the Dahl operator, equations (9) to (13)."""
@@ -409,7 +414,8 @@ def identify_step(
     Returns
     -------
     StepResult
-        ``pt.identify(other_log, initial=result)`` holds its hysteresis parameters.
+        ``pt.identify(other_log, "dahl", parameters=result.parameters)`` holds its hysteresis
+        parameters.
 
     Raises
     ------

@@ -11,7 +11,6 @@ from ... import _core
 from ..._support.arguments import positive
 from ..._support.arrays import LARGEST, SHORTEST
 from ..._support.json_text import object_of
-from ..._support.messages import quoted
 from ...errors import ParameterError
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Drift", "asked_drift", "drift_entry", "drift_of", "drift_of_asked"]
+__all__ = ["Drift", "drift_entry", "drift_of", "time_constant"]
 
 
 # Instants of a record, on any clock [s].
@@ -146,66 +145,11 @@ class Drift:
         return found
 
 
-def asked_drift(drift: object) -> float | None:
-    """Check what is asked of the drift of a record.
-
-    Parameters
-    ----------
-    drift : object
-        Argument of the caller: True or ``"auto"`` for what the record shows, False for none, or
-        a time constant [s].
-
-    Returns
-    -------
-    float or None
-        The time constant [s]; 0 for none, None for what the record shows.
-
-    Raises
-    ------
-    ParameterError
-        It is none of these.
-    """
-    if isinstance(drift, (bool, np.bool_)):
-        return None if drift else 0.0
-    if drift is None or (isinstance(drift, str) and drift == "auto"):
-        return None
-    return _time_constant("drift", drift)
-
-
-def _time_constant(name: str, value: object) -> float:
+def time_constant(name: str, value: object) -> float:
+    """Check the time constant of a drift [s]."""
     time = positive(name, value, "s")
     if time < SHORTEST:
         raise ParameterError(f"{name} is {time:g} s: expected {SHORTEST:g} s or more")
-    return time
-
-
-def drift_of_asked(drift: object, *, offset: bool, searched: bool) -> float | None:
-    """Time constant of the drift of a record, as the core takes it.
-
-    Parameters
-    ----------
-    drift : object
-        As for `asked_drift`.
-    offset : bool
-        Whether an offset of the record is fitted.
-    searched : bool
-        Whether the model is searched: such a one has no drift where nobody asks for it.
-
-    Returns
-    -------
-    float or None
-        As for `asked_drift`.
-
-    Raises
-    ------
-    ParameterError
-        The drift is none of what `identify` takes, or is asked for without an offset.
-    """
-    time = asked_drift(drift)
-    if drift is None and (searched or not offset):
-        return 0.0
-    if not offset and time != 0.0:
-        raise ParameterError(f"drift is {quoted(drift)}: expected none with offset=False")
     return time
 
 
@@ -271,7 +215,7 @@ def drift_of(entry: Any) -> Drift | None:
             f"{values['begin']:g} s"
         )
     return Drift(
-        time=_time_constant("drift: time", time["value"]),
+        time=time_constant("drift: time", time["value"]),
         # Files of before have no such entry.
         time_fitted=time.get("free", True) is True,
         **values,

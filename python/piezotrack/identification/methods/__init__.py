@@ -1,1 +1,1 @@
-"""Methods of a search, as settings."""
+"""MethodChoice of a search, as settings."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
 
 from ... import _core
 from ..._core import DescentSettings
@@ -31,6 +32,11 @@ class Descents:
         Descents that have to end within 0.1 % of the lowest cost, 2 or more.
     rounds : int, optional
         Largest number of rounds.
+    seed : int, optional
+        0 or above. The same seed gives the same bits, for any number of threads.
+    runs : int, optional
+        Number of independent searches, each with its own random numbers. Different final costs show
+        that there are several local minima.
 
     Raises
     ------
@@ -48,6 +54,10 @@ class Descents:
     starts: int = 32
     agreeing: int = 2
     rounds: int = 10
+    seed: int = 0
+    runs: int = 1
+
+    name: ClassVar[str] = "descents"
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -59,4 +69,8 @@ class Descents:
     @property
     def _core(self) -> DescentSettings:
         """The settings in the core."""
-        return DescentSettings(**asdict(self))
+        return DescentSettings(**self.settings())
+
+    def settings(self) -> dict[str, Any]:
+        """Return the settings of one search, without `seed` and `runs`."""
+        return {name: value for name, value in vars(self).items() if name not in ("seed", "runs")}

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ... import _core
 from ..._support.arguments import as_numbers
 from ..._support.messages import quoted
-from ...errors import DataError, ParameterError
+from ...errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ...data.dataset import Dataset
-    from ...stages.model_info import ModelInfo
-
 __all__ = ["LeastSquares"]
 
-MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS = 32, 8, 8
+MOST_PLAYS, MOST_ZONES = 32, 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,10 +67,8 @@ class LeastSquares:
     ... )
     >>> u = 37.5 * (1 - np.cos(np.arange(2000) / 100.0))
     >>> log = pt.Dataset(u=u, y=stage.simulate(u, 0.01).x, dt=0.01)
-    >>> settings = pt.identification.LeastSquares(
-    ...     thresholds=[5.0, 10.0, 20.0], dead_zones=False, dynamics=None
-    ... )
-    >>> fit = pt.identify(log, "prandtl-ishlinskii", least_squares=settings)
+    >>> method = pt.LeastSquares(thresholds=[5.0, 10.0, 20.0], dead_zones=False, dynamics=None)
+    >>> fit = pt.identify(log, "prandtl-ishlinskii", method=method)
     >>> print(", ".join(f"{1e6 * weight:.3f}" for weight in fit.model.weights), "um/V")
     0.000, 0.200, 0.100 um/V
     """
@@ -84,6 +79,8 @@ class LeastSquares:
     dead_zones: bool | int = True
     creep: Literal["auto"] | bool | Sequence[float] = "auto"
     dynamics: Literal["auto", "first", "second"] | None = "auto"
+
+    name: ClassVar[str] = "least_squares"
 
     def __post_init__(self) -> None:
         if self.count is not None:
@@ -100,46 +97,13 @@ class LeastSquares:
                 raise ParameterError(
                     f"dead_zones is {zones}: expected up to {MOST_ZONES} dead zones"
                 )
-        if not (isinstance(self.creep, bool) or self._chosen):
+        if not isinstance(self.creep, bool) and self.creep != "auto":
             object.__setattr__(self, "creep", as_numbers("creep", self.creep))
         if self.dynamics not in (None, "auto", "first", "second"):
             raise ParameterError(
                 f"dynamics is {quoted(self.dynamics)}: expected 'auto', None, 'first' or 'second'"
             )
 
-    @property
-    def _chosen(self) -> bool:
-        """Whether the creep is what the record shows."""
-        return isinstance(self.creep, str) and self.creep == "auto"
-
-    def _places(self, info: ModelInfo) -> list[float] | None:
-        """Thresholds or levels that are given, whichever the model has."""
-        places = None
-        for name, given in (("thresholds", self.thresholds), ("levels", self.levels)):
-            if given is not None and name != info.places:
-                raise ParameterError(
-                    f"{name} is {quoted(given)}: expected None, as {info.title} has no {name}"
-                )
-            places = places if given is None else list(given)
-        return places
-
-    def _zones(self, info: ModelInfo) -> int:
-        if self.dead_zones is True:
-            return 2 if info.has_dead_zones else 0
-        return int(self.dead_zones)
-
-    def _times(self, data: Dataset) -> list[float] | None:
-        if isinstance(self.creep, str):
-            return None
-        if not isinstance(self.creep, bool):
-            return list(self.creep)
-        if not self.creep:
-            return []
-        shortest, longest = 5.0 * data.dt, 0.5 * data.duration
-        decades = [10.0**k for k in range(-9, 10) if shortest <= 10.0**k <= longest]
-        if not decades:
-            raise DataError(
-                f"the window of {data.duration:.4g} s is too short to show creep: expected at "
-                f"least {20.0 * shortest:.4g} s, or creep=False"
-            )
-        return decades[-MOST_RELAXATIONS:]
+    def settings(self) -> dict[str, Any]:
+        """Return the settings by their names."""
+        return dict(vars(self))

@@ -1,4 +1,4 @@
-"""Keys: hashes of records and arguments, by which a result is known again."""
+"""Hashes of records and settings, by which a result is known again."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from ...errors import ParameterError
 if TYPE_CHECKING:
     from ...data.dataset import Dataset
 
-__all__ = ["exact", "key_of", "plain", "record_key"]
+__all__ = ["as_plain_data", "exact_text", "hash_of", "record_hash"]
 
 # Hexadecimal digits of a hash: two in a million million million names would be the same.
 DIGITS = 32
 
 
-def record_key(data: Dataset) -> str:
+def record_hash(data: Dataset) -> str:
     """Hash of a record: samples, window, where it begins, hold and unit of the drive.
 
     Parameters
@@ -37,10 +37,10 @@ def record_key(data: Dataset) -> str:
     str
         Hexadecimal digits.
     """
-    return key_of([data.sha256, data.hold, data.drive_unit, exact(float(data.t[0]))])
+    return hash_of([data.sha256, data.hold, data.drive_unit, exact_text(float(data.t[0]))])
 
 
-def plain(name: str, value: Any) -> Any:
+def as_plain_data(name: str, value: Any) -> Any:
     """Put an argument in numbers, texts, lists and dicts.
 
     Parameters
@@ -61,7 +61,7 @@ def plain(name: str, value: Any) -> Any:
         There are other things in it.
     """
     if is_dataclass(value) and not isinstance(value, type):
-        return plain(name, asdict(value))
+        return as_plain_data(name, asdict(value))
     if value is None or isinstance(value, (bool, str)):
         return value
     if isinstance(value, np.bool_):
@@ -71,16 +71,16 @@ def plain(name: str, value: Any) -> Any:
     if isinstance(value, Real):
         return float(value)
     if isinstance(value, Mapping):
-        return {str(key): plain(name, entry) for key, entry in value.items()}
+        return {str(key): as_plain_data(name, entry) for key, entry in value.items()}
     if isinstance(value, Set):
         # Its order is another one in every process.
-        return sorted(plain(name, entry) for entry in value)
+        return sorted(as_plain_data(name, entry) for entry in value)
     if has_entries(value):
-        return [plain(name, entry) for entry in value]
+        return [as_plain_data(name, entry) for entry in value]
     raise ParameterError(f"{name} is {quoted(value)}: expected numbers, texts, lists or mappings")
 
 
-def exact(value: Any) -> Any:
+def exact_text(value: Any) -> Any:
     """Write numbers to the last bit, the same for 1 and 1.0.
 
     Parameters
@@ -94,9 +94,9 @@ def exact(value: Any) -> Any:
         The same with texts for numbers.
     """
     if isinstance(value, dict):
-        return {key: exact(entry) for key, entry in value.items()}
+        return {key: exact_text(entry) for key, entry in value.items()}
     if isinstance(value, list):
-        return [exact(entry) for entry in value]
+        return [exact_text(entry) for entry in value]
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         try:
             return float(value).hex()
@@ -105,7 +105,7 @@ def exact(value: Any) -> Any:
     return value
 
 
-def key_of(content: Any) -> str:
+def hash_of(content: Any) -> str:
     """Hash of plain data.
 
     Parameters

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import expect
-from ...data.dataset import Dataset
 from ...errors import ParameterError
 from ...stages.registry import model_named
-from ..fitted.start import checked_history
-from .problem import question_of
-from .records import Asked
+from .problem import Problem
+from .records import records_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from numpy.typing import ArrayLike, NDArray
 
-    from ..experiments.step_response import StepResult
+    from ...data.dataset import Dataset
     from ..fitted.start import History
+    from .parameter import ParameterEntry
+    from .records import Delay, Drift, Record
 
     Array = NDArray[np.float64]
 
@@ -37,21 +36,16 @@ class Objective:
 
     Parameters
     ----------
-    data : Dataset
+    data : Dataset or Record
         The record.
     model : str
         Name of a model that is searched, as for `identify`.
-    offset : bool, optional
-        Whether an offset of the sensor is fitted.
+    parameters, constraints, creep, offset, delay, drift : optional
+        As for `identify`.
     history : {"virgin", "settled", "fit"}, optional
-        What the stage went through before the record.
-    drift : bool or float, optional
-        Slow drift of the sensor along the record, as for `identify`; none where it is not given.
+        What the stage went through before the record; nothing where it is not given.
     threads : int, optional
         Up to 256; all cores where it is 0 or not given.
-    free, fixed, initial, bounds, scales, ties, constraints, priors, stiffness, delay, \
-    creep : optional
-        As for `identify`.
 
     Raises
     ------
@@ -70,52 +64,52 @@ class Objective:
 
     def __init__(
         self,
-        data: Dataset,
+        data: Dataset | Record,
         model: str,
         *,
-        offset: bool = True,
-        history: History = "virgin",
-        drift: bool | float | None = None,
-        threads: int | None = None,
-        free: Iterable[str] | None = None,
-        fixed: Mapping[str, float] | None = None,
-        initial: StepResult | None = None,
-        bounds: Mapping[str, tuple[float, float]] | None = None,
-        scales: Mapping[str, Literal["linear", "log"]] | None = None,
-        ties: Mapping[str, str] | None = None,
+        parameters: Mapping[str, ParameterEntry] | None = None,
         constraints: Iterable[str] | None = None,
-        priors: Mapping[str, tuple[float, float]] | None = None,
-        stiffness: float | None = None,
-        delay: bool | float | tuple[float, float] | None = None,
         creep: bool | Iterable[float] | None = None,
+        offset: bool = True,
+        delay: Delay = None,
+        drift: Drift = None,
+        history: History | None = None,
+        threads: int | None = None,
     ) -> None:
-        expect("data", data, Dataset, "a Dataset, one record")
-        info = model_named(model)
-        if not info.searched:
-            raise ParameterError(f"model is {model!r}: expected one that is searched")
-        question = question_of(
-            Asked(
-                data=data,
-                offset=_core.as_truth("offset", offset),
-                history=checked_history(history),
-                delay=delay,
-                drift=drift,
-            ),
-            info,
-            free=free,
-            fixed=fixed,
-            initial=initial,
-            bounds=bounds,
-            scales=scales,
-            ties=ties,
-            constraints=constraints,
-            priors=priors,
-            stiffness=stiffness,
-            creep=creep,
+        records = records_of(data, offset=offset, delay=delay, drift=drift, history=history)
+        if not model_named(model).searched:
+            raise ParameterError(
+                f"model is {model!r}: expected one that is searched", argument="model"
+            )
+        self._enter(
+            Problem.checked(model, records, parameters, constraints, creep),
+            0 if threads is None else _core.as_count("threads", threads),
         )
-        count = 0 if threads is None else _core.as_count("threads", threads)
-        self._core = _core.Objective(question, count)
-        self._scalars = [one.name for one in info.parameters if not one.is_list]
+
+    @classmethod
+    def _of(cls, problem: Problem, threads: int = 0) -> Self:
+        """Return the cost that the solution of a problem minimises.
+
+        Parameters
+        ----------
+        problem : Problem
+            A model that is searched, and one record.
+        threads : int, optional
+            All cores where it is 0.
+
+        Returns
+        -------
+        Objective
+            The cost.
+        """
+        objective = cls.__new__(cls)
+        objective._enter(problem, threads)
+        return objective
+
+    def _enter(self, problem: Problem, threads: int) -> None:
+        problem.check_data()
+        self._core = _core.Objective(problem, threads)
+        self._scalars = [one.name for one in problem.info.parameters if not one.is_list]
 
     @property
     def coordinates(self) -> list[tuple[str, float, float, str]]:

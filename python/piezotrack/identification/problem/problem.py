@@ -1,181 +1,206 @@
-"""What is asked of a record: the searched parameters, their bounds, and what is known of them."""
+"""The problem of an identification: a model, records, and what is known of the parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Self
 
-from ... import _core
 from ..._support.arguments import as_numbers, has_entries
 from ..._support.messages import quoted
 from ...data import diagnostics
 from ...errors import ParameterError
-from ..experiments.step_response import StepResult
-from ..fitted.drift import drift_of_asked
-from .parameters import ParameterArguments
-from .records import of_record
+from ...stages.registry import model_named
+from .fingerprint import as_plain_data, record_hash
+from .parameter import Parameter, parameters_of, plain_text
+from .records import Record, labels_of, of_record
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from ...stages.model_info import ModelInfo
-    from .records import Asked
 
-__all__ = ["delay_bounds", "question_of"]
+__all__ = ["AUTO", "Problem"]
+
+# The name that stands for the model that suits the records best.
+AUTO = "auto"
+# Defaults of a record that are not part of the settings of a problem.
+NOTHING_SAID = {"offset": True, "delay": None, "drift": None, "history": None, "weight": 1.0}
 
 
-def question_of(
-    asked: Asked,
-    info: ModelInfo,
-    *,
-    free: object = None,
-    fixed: object = None,
-    initial: object = None,
-    bounds: object = None,
-    scales: object = None,
-    ties: object = None,
-    constraints: object = None,
-    priors: object = None,
-    stiffness: object = None,
-    creep: object = None,
-) -> dict[str, Any]:
-    """Check what is asked of a record, and return it as the core takes it.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Problem:
+    """What is identified from which records; how, is said by a method.
 
-    Parameters
+    The compiled module reads its attributes.
+
+    Attributes
     ----------
-    asked : Asked
-        The record, and what is asked of it alone; without a history that of a stage that never
-        moved.
-    info : ModelInfo
-        The model.
-    free, fixed, initial, bounds, scales, ties, constraints, priors, stiffness, creep
-        As for `identify`, not yet checked; None stands for the default.
-
-    Returns
-    -------
-    dict
-        In plain data.
-
-    Raises
-    ------
-    ParameterError, DataError
-        As for `identify`.
-    """
-    data = asked.data
-    with of_record(asked.label):
-        searched_delay = delay_bounds(asked.delay)
-        drift = drift_of_asked(asked.drift, offset=asked.offset, searched=True)
-    creep_times = _creep_times(False if creep is None else creep)
-    said = ParameterArguments.checked(scales, ties, constraints, priors)
-    held = _held(initial, fixed, free, bounds, said.named)
-    with of_record(asked.label):
-        diagnostics.check_record(data, searches_hysteresis=bool(set(info.hysteresis) - set(held)))
-    full = data.full
-    return {
-        "model": info.name,
-        "u": full.u,
-        "y": full.y,
-        "dt": data.dt,
-        "hold_name": data.hold,
-        "start": data.warmup,
-        "free": _names(free),
-        "fixed": list(held.items()),
-        "bounds": [(name, _pair(name, pair)) for name, pair in _items("bounds", bounds)],
-        **said.core,
-        "stiffness": None if stiffness is None else _core.as_number("stiffness", stiffness),
-        "offset": asked.offset,
-        "delay": searched_delay,
-        "drift": drift,
-        "history": asked.history or "virgin",
-        "creep": creep_times,
-        "label": asked.label,
-        "weight": asked.weight,
-    }
-
-
-def _names(free: object) -> list[str] | None:
-    """Check that free names parameters in a list."""
-    if free is None:
-        return None
-    if not has_entries(free):
-        raise ParameterError(f"free is {quoted(free)}: expected names in a list, as ['mass']")
-    return [str(name) for name in free]
-
-
-def _held(
-    initial: object, fixed: object, free: object, bounds: object, named: set[str]
-) -> dict[str, float]:
-    """Return the parameters held: by `fixed`, and by a step response where not named elsewhere."""
-    given = {name: _core.as_number(name, value) for name, value in _items("fixed", fixed)}
-    if initial is None:
-        return given
-    if not isinstance(initial, StepResult):
-        raise ParameterError(
-            f"initial is {type(initial).__name__}: expected a StepResult, see pt.identify_step"
-        )
-    said = named | {*(_names(free) or []), *(name for name, _ in _items("bounds", bounds))}
-    return {n: v for n, v in initial.hysteresis.items() if n not in said} | given
-
-
-def _items(argument: str, mapping: object) -> list[tuple[str, Any]]:
-    """Check that an argument is a mapping, and return its entries."""
-    if mapping is None:
-        return []
-    if not isinstance(mapping, Mapping):
-        raise ParameterError(
-            f"{argument} is {quoted(mapping)}: expected a mapping of names to values"
-        )
-    return [(str(name), value) for name, value in mapping.items()]
-
-
-def _pair(name: str, pair: object) -> tuple[float, float]:
-    """Check that bounds are two numbers."""
-    two = list(pair) if has_entries(pair) else []
-    if len(two) != 2:
-        raise ParameterError(f"bounds of {name} are {quoted(pair)}: expected (low, high)")
-    low, high = two
-    return (
-        _core.as_number(f"lower bound of {name}", low),
-        _core.as_number(f"upper bound of {name}", high),
-    )
-
-
-def delay_bounds(delay: object) -> tuple[float, float] | None:
-    """Bounds between which a delay is searched.
-
-    Parameters
-    ----------
-    delay : object
-        As for `identify`, not yet checked.
-
-    Returns
-    -------
-    (float, float) or None
-        The bounds [s], equal ones where it is known; None where the core chooses them.
+    model : str
+        Name of the model, or ``"auto"``.
+    records : tuple of Record
+        At least one.
+    parameters : mapping of str to Parameter
+        The parameters of which something is said.
+    constraints : tuple of str
+        Inequalities between two parameters.
+    creep : bool or tuple of float or None
+        Whether the stage creeps, or its time constants [s].
 
     Raises
     ------
     ParameterError
-        It is none of what `identify` takes.
+        There is no such model, or an attribute does not apply to it.
     """
-    if delay is None or isinstance(delay, bool):
-        return None if delay else (0.0, 0.0)
-    if has_entries(delay):
-        low, high = _pair("delay", delay)
-        if low >= high:
+
+    model: str
+    records: tuple[Record, ...]
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    constraints: tuple[str, ...] = ()
+    creep: bool | tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if self.model == AUTO:
+            self._refuse_of_one_model()
+        elif not self.info.searched:
+            for name in ("parameters", "constraints", "creep"):
+                if (value := getattr(self, name)) not in ({}, (), None):
+                    raise ParameterError(
+                        f"{name} is {quoted(value)}: expected none with the model "
+                        f"'{self.model}', whose parameters follow by least squares",
+                        argument=name,
+                    )
+
+    @classmethod
+    def checked(
+        cls,
+        model: str,
+        records: tuple[Record, ...],
+        parameters: object,
+        constraints: object,
+        creep: object,
+    ) -> Self:
+        """Check the arguments of `identify`; None stands for what is not given."""
+        return cls(
+            model=model,
+            records=records,
+            parameters=parameters_of(parameters),
+            constraints=_inequalities(constraints),
+            creep=_creep_of(creep),
+        )
+
+    def _refuse_of_one_model(self) -> None:
+        """Refuse what names parameters of one model; all that are searched have a stiffness."""
+        others = {
+            name: one
+            for name, one in self.parameters.items()
+            if name != "stiffness" or list(_said(one)) != ["value"]
+        }
+        for name, value in (("parameters", others), ("constraints", self.constraints)):
+            if value:
+                raise ParameterError(
+                    f"{name} is {quoted(value)}: expected none with model='auto'; name the "
+                    "model whose parameters these are, as model='dahl'",
+                    argument=name,
+                )
+
+    @property
+    def info(self) -> ModelInfo:
+        """The model; not of ``"auto"``."""
+        return model_named(self.model)
+
+    @property
+    def is_searched(self) -> bool:
+        """Whether parameters are searched, from a seed; of ``"auto"`` those of some models are."""
+        return self.model == AUTO or self.info.searched
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """How messages call each record."""
+        return labels_of(self.records)
+
+    def of_model(self, info: ModelInfo) -> Problem:
+        """Return the problem for a model, without what does not apply to it."""
+        if info.searched:
+            return replace(self, model=info.name)
+        return Problem(model=info.name, records=self.records)
+
+    def check_data(self) -> None:
+        """Refuse records from which the parameters of a hysteresis cannot be searched.
+
+        Raises
+        ------
+        DataError
+            Neither drive nor displacement of a record ever reverses.
+        """
+        held = {name for name, one in self.parameters.items() if one.value is not None}
+        for one, label in zip(self.records, self.labels, strict=True):
+            with of_record(label):
+                diagnostics.check_record(
+                    one.data, searches_hysteresis=bool(set(self.info.hysteresis) - held)
+                )
+
+    def settings(self) -> dict[str, Any]:
+        """Return all but the records as plain data, without defaults."""
+        of_stage = {
+            "parameters": {name: _said(one) for name, one in self.parameters.items()},
+            "constraints": list(self.constraints),
+            "creep": self.creep,
+        }
+        return {"model": self.model} | {
+            name: as_plain_data(name, value)
+            for name, value in of_stage.items()
+            if value not in ({}, [], None)
+        }
+
+    def record_settings(self) -> list[dict[str, Any]]:
+        """Return what is said of each record alone as plain data, without defaults."""
+        return [
+            {
+                name: as_plain_data(name, value)
+                for name, default in NOTHING_SAID.items()
+                if (value := getattr(one, name)) != default
+            }
+            for one in self.records
+        ]
+
+    def content(self) -> list[Any]:
+        """Return all that a solution depends on as plain data, records by their hashes."""
+        hashes = [record_hash(one.data) for one in self.records]
+        return [hashes, self.record_settings(), self.settings()]
+
+
+def _said(parameter: Parameter) -> dict[str, Any]:
+    """Return what is said of a parameter."""
+    return {name: value for name, value in vars(parameter).items() if value is not None}
+
+
+def _inequalities(constraints: object) -> tuple[str, ...]:
+    """Check the types of inequalities."""
+    if constraints is None:
+        return ()
+    if not has_entries(constraints):
+        raise ParameterError(
+            f"constraints is {quoted(constraints)}: expected texts in a list, as ['a2 < b1']",
+            argument="constraints",
+        )
+    texts = tuple(constraints)
+    for text in texts:
+        if not isinstance(text, str):
             raise ParameterError(
-                f"bounds of delay are ({low:g}, {high:g}) s: expected the lower one first"
+                f"constraint is {quoted(text)}: expected a text, as 'a2 < b1'",
+                argument="constraints",
             )
-        return low, high
-    known = _core.as_number("delay", delay)
-    return known, known
+    return tuple(map(plain_text, texts))
 
 
-def _creep_times(creep: object) -> list[float] | None:
-    """Time constants of the creep: None if the core chooses them, empty if there is none."""
-    if isinstance(creep, bool):
-        return None if creep else []
+def _creep_of(creep: object) -> bool | tuple[float, ...] | None:
+    """Check the type of a creep."""
+    if creep is None or isinstance(creep, bool):
+        return creep
     if not has_entries(creep):
         raise ParameterError(
             f"creep is {quoted(creep)}: expected True, False or time constants in seconds, "
-            "as [0.1, 1.0]"
+            "as [0.1, 1.0]",
+            argument="creep",
         )
-    return list(as_numbers("creep", creep))
+    return as_numbers("creep", creep)

@@ -1,142 +1,188 @@
-"""The records of an identification, each with what is asked of it alone."""
+"""The records of a problem, each with what is fitted of it alone."""
 
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import KW_ONLY, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ... import _core
+from ..._support.arguments import has_entries
 from ..._support.messages import quoted
 from ...data.dataset import Dataset
 from ...errors import ParameterError, PiezotrackError
+from ..fitted.drift import time_constant
 from ..fitted.start import checked_history
+from .parameter import bounds_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from ..fitted.start import History
 
-__all__ = ["Asked", "Own", "asked_of", "of_record"]
+    Delay = bool | float | tuple[float, float] | None
+    Drift = bool | float | None
+
+__all__ = ["Record", "label_of", "labels_of", "of_record", "records_of"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Asked:
-    """A record, and what is asked of it alone.
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A record for `identify`, with the arguments that are its own.
 
-    Attributes
+    Parameters
     ----------
     data : Dataset
         The record.
-    offset : bool
-        Whether an offset of the sensor is fitted.
-    history : {"virgin", "settled", "fit"} or None
-        What the stage went through before; None for what the record shows.
-    delay : object
-        As for `identify`, not yet checked.
-    weight : float
-        How much each of its samples counts beside those of the others.
-    label : str
-        How messages call it; empty where it is the only one.
-    drift : object
-        As for `identify`, not yet checked.
+    offset : bool, optional
+        Whether a constant offset of the displacement is fitted too.
+    delay : bool, float or (float, float), optional
+        Delay of the displacement with respect to the drive [s]: none (False, the default), fitted
+        (True), known (a number), or fitted between two bounds.
+    drift : bool or float, optional
+        Slow drift of the sensor along the record: none (False), with a time constant that the
+        record shows (True), or with this one [s]; see `identify` for where it is not given.
+    history : {"virgin", "settled", "fit"}, optional
+        What the stage went through before the record; what the record shows where not given.
+    weight : float, optional
+        How much each of its samples counts beside those of the other records: only the ratios
+        matter, and a weight of 2 is that record given twice.
+
+    Raises
+    ------
+    ParameterError
+        One is of another type, or a drift is fitted without an offset.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> log = pt.datasets.dbo_training()
+    >>> pt.Record(log[3.0:23.0], delay=True).weight
+    1.0
     """
 
     data: Dataset
+    _: KW_ONLY
     offset: bool = True
+    delay: Delay = None
+    drift: Drift = None
     history: History | None = None
-    delay: object = None
-    drift: object = None
     weight: float = 1.0
-    label: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.data, Dataset):
+            raise ParameterError(
+                f"data is {type(self.data).__name__}: expected a Dataset, as pt.read or "
+                "pt.Dataset.from_frame make it",
+                argument="data",
+            )
+        checked_history(self.history)
+        offset = _core.as_truth("offset", self.offset)
+        drift = _drift_of(self.drift)
+        if not offset and drift:
+            raise ParameterError(
+                f"drift is {quoted(self.drift)}: expected none with offset=False", argument="drift"
+            )
+        object.__setattr__(self, "offset", offset)
+        object.__setattr__(self, "drift", drift)
+        object.__setattr__(self, "delay", _delay_of(self.delay))
+        object.__setattr__(self, "weight", _core.as_number("weight", self.weight))
+
+    @property
+    def fits_delay(self) -> bool:
+        """Whether the delay is fitted."""
+        return self.delay is True or (
+            isinstance(self.delay, tuple) and self.delay[0] < self.delay[1]
+        )
+
+    @property
+    def fits_drift_time(self) -> bool:
+        """Whether the time constant of a drift is fitted, where there is one."""
+        return self.drift is None or self.drift is True
 
 
-class Own(NamedTuple):
-    """Arguments of `identify` that each record may have of its own, not yet checked."""
-
-    offset: object
-    history: object
-    delay: object
-    weights: object
-    drift: object = None
+def _delay_of(delay: object) -> Delay:
+    """Check the type of a delay."""
+    if delay is None or isinstance(delay, (bool, np.bool_)):
+        return None if delay is None else bool(delay)
+    return bounds_of("delay", delay) if has_entries(delay) else _core.as_number("delay", delay)
 
 
-def asked_of(data: object, own: Own) -> tuple[Asked, ...]:
-    """Check the records of an identification, and what is asked of each alone.
+def _drift_of(drift: object) -> Drift:
+    """Check the type of a drift."""
+    if drift is None or isinstance(drift, (bool, np.bool_)):
+        return None if drift is None else bool(drift)
+    return time_constant("drift", drift)
+
+
+def records_of(
+    data: object, *, offset: object, delay: object, drift: object, history: object
+) -> tuple[Record, ...]:
+    """Check the records of an identification.
 
     Parameters
     ----------
     data : object
-        A Dataset, or several in a list.
-    own : Own
-        A value for all records, or a list with one for each.
+        A Dataset or a Record, or several of them in a list.
+    offset, delay, drift, history : object
+        Values for each Dataset; a Record has its own.
 
     Returns
     -------
-    tuple of Asked
+    tuple of Record
         At least one.
 
     Raises
     ------
     ParameterError
-        No record, what is no record, records whose drives have different units, a list of another
-        length, or a value that cannot be used.
+        No record, what is no record, records whose drives have different units, a value that cannot
+        be used, or one that no Dataset takes.
     """
-    if isinstance(data, Dataset):
-        if own.weights is not None:
+    given = [data] if isinstance(data, (Dataset, Record)) else _listed(data)
+    values = {"offset": offset, "delay": delay, "drift": drift, "history": history}
+    if all(isinstance(one, Record) for one in given):
+        for name, value in values.items():
+            if value is not None and not (name == "offset" and value is True):
+                raise ParameterError(
+                    f"{name} is {quoted(value)}: expected it in pt.Record, as {name}=",
+                    argument=name,
+                )
+    records = tuple(
+        one if isinstance(one, Record) else Record(one, **values)  # type: ignore[arg-type]
+        for one in given
+    )
+    datasets = [one.data for one in records]
+    for i, one in enumerate(datasets):
+        if one.drive_unit != datasets[0].drive_unit:
             raise ParameterError(
-                f"weights is {quoted(own.weights)}: expected none with one record, as it is beside "
-                "others that a weight counts"
+                f"the drive of {label_of(one, i)} is in {one.drive_unit}: expected "
+                f"{datasets[0].drive_unit}, as that of {label_of(datasets[0], 0)}",
+                argument="data",
             )
-        history, offset = checked_history(own.history), _core.as_truth("offset", own.offset)
-        one = Asked(data=data, offset=offset, history=history, delay=own.delay, drift=own.drift)
-        return (one,)
-    records = _records(data)
-    count = len(records)
-    offsets, histories = _each("offset", own.offset, count), _each("history", own.history, count)
-    delays, weights = _each("delay", own.delay, count), _each("weights", own.weights, count)
-    drifts = _each("drift", own.drift, count)
-    asked = []
-    for i, record in enumerate(records):
-        label = _label(record, i) if count > 1 else ""
-        with of_record(label):
-            weight = 1.0 if weights[i] is None else _core.as_number("weight", weights[i])
-            history = checked_history(histories[i])
-            offset = _core.as_truth("offset", offsets[i])
-        asked.append(
-            Asked(
-                data=record,
-                offset=offset,
-                history=history,
-                delay=delays[i],
-                drift=drifts[i],
-                weight=weight,
-                label=label,
-            )
-        )
-    return tuple(asked)
+    return records
 
 
-def _records(data: object) -> list[Dataset]:
-    """Check that records are a list of at least one, with drives in one unit."""
+def _listed(data: object) -> list[Dataset | Record]:
+    """Check that records are a list of at least one."""
     if not isinstance(data, (list, tuple)):
         raise ParameterError(
             f"data is {type(data).__name__}: expected a Dataset, as pt.read "
-            "or pt.Dataset.from_frame make it, or several in a list"
+            "or pt.Dataset.from_frame make it, or several in a list",
+            argument="data",
         )
     if not data:
-        raise ParameterError("data is an empty list: expected at least one Dataset")
-    for i, record in enumerate(data):
-        if not isinstance(record, Dataset):
+        raise ParameterError(
+            "data is an empty list: expected at least one Dataset", argument="data"
+        )
+    for i, one in enumerate(data):
+        if not isinstance(one, (Dataset, Record)):
             raise ParameterError(
                 f"data is a {type(data).__name__} whose record {i + 1} is "
-                f"{type(record).__name__}: expected a Dataset, as pt.read or "
-                "pt.Dataset.from_frame make it"
-            )
-        if record.drive_unit != data[0].drive_unit:
-            raise ParameterError(
-                f"the drive of {_label(record, i)} is in {record.drive_unit}: expected "
-                f"{data[0].drive_unit}, as that of {_label(data[0], 0)}"
+                f"{type(one).__name__}: expected a Dataset, as pt.read or "
+                "pt.Dataset.from_frame make it, or a pt.Record",
+                argument="data",
             )
     return list(data)
 
@@ -155,22 +201,18 @@ def of_record(label: str) -> Iterator[None]:
     except PiezotrackError as error:
         if not label:
             raise
-        raise type(error)(f"{label}: {error}") from None
+        labelled = type(error)(f"{label}: {error}")
+        vars(labelled).update(vars(error))
+        raise labelled from None
 
 
-def _label(record: Dataset, i: int) -> str:
-    """How messages call a record."""
-    return f"record {i + 1}" + (f" ({record.source})" if record.source else "")
+def labels_of(records: Sequence[Record]) -> tuple[str, ...]:
+    """Return how messages call each record; nothing where there is one."""
+    if len(records) == 1:
+        return ("",)
+    return tuple(label_of(one.data, i) for i, one in enumerate(records))
 
 
-def _each(name: str, value: object, count: int) -> Sequence[Any]:
-    """Return the value of an argument for each record: a list has one for each."""
-    if not isinstance(value, list):
-        if name == "weights" and isinstance(value, tuple):
-            return _each(name, list(value), count)
-        return [value] * count
-    if len(value) != count:
-        raise ParameterError(
-            f"{name} has {len(value)} entries: expected {count}, one for each record"
-        )
-    return value
+def label_of(data: Dataset, i: int) -> str:
+    """Return how messages call a record."""
+    return f"record {i + 1}" + (f" ({data.source})" if data.source else "")

@@ -1,10 +1,11 @@
-"""Whether a record shows that its stage had moved before: what a kind gains by other histories."""
+"""Whether a record shows that its stage had moved before: what a model gains by other histories."""
 
 from __future__ import annotations
 
 import math
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,20 +14,18 @@ from ..fitted.start import GAIN
 from ..problem.objective import Objective
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
-    from ...stages.model_info import ModelInfo
     from ..fitted.identification import Identification
     from ..fitted.start import History
+    from ..problem.problem import Problem
 
     Array = NDArray[np.float64]
 
-__all__ = ["Gaining", "other_histories"]
+__all__ = ["EarlierMotion", "earlier_motion"]
 
-# Samples of a long record that are asked: the history shows at its beginning.
+# Samples of a long record that are simulated: the history shows at its beginning.
 BEGINNING = 200_000
 # Share of the cost by which the voltages before a record change it where it shows its history.
 UNSEEN = 1e-3
@@ -35,7 +34,7 @@ GRID = 15
 VOLTAGE = "voltage_before"
 
 
-class Gaining(NamedTuple):
+class EarlierMotion(NamedTuple):
     """A history that suits a record better than that of a stage that never moved.
 
     Attributes
@@ -50,45 +49,37 @@ class Gaining(NamedTuple):
     share: float
 
 
-def other_histories(
-    data: Dataset,
-    info: ModelInfo,
-    fit: Identification,
-    *,
-    offset: bool,
-    asked: Mapping[str, Any],
-) -> list[Gaining]:
+def earlier_motion(problem: Problem, fit: Identification, threads: int) -> list[EarlierMotion]:
     """Find the histories that lower the cost next to a minimum without one.
 
     Parameters
     ----------
-    data : Dataset
-        The record.
-    info : ModelInfo
-        The kind.
+    problem : Problem
+        A model that is searched, and one record.
     fit : Identification
         Its fit as of a stage that never moved before the record.
-    offset : bool
-        Whether an offset of the sensor is fitted.
-    asked : mapping
-        Further arguments of `Objective`.
+    threads : int
+        All cores where it is 0.
 
     Returns
     -------
-    list of Gaining
+    list of EarlierMotion
         Those by which the cost falls enough, the one with less freedom first; not that one where
         the cost falls as much again by the other.
     """
+    (record,) = problem.records
+    data = record.data
 
     def objective_of(part: Dataset, history: History) -> Objective:
-        return Objective(part, info.name, offset=offset, history=history, **asked)
+        with_history = replace(record, data=part, history=history)
+        return Objective._of(replace(problem, records=(with_history,)), threads)
 
     def lowest(objective: Objective) -> float:
         return float(objective.descend(_starts(objective, fit))[1].min())
 
     part, cost = data, fit.cost
     if len(data) > BEGINNING:
-        # Where that shows no reversal, the whole record has to be asked.
+        # Where that shows no reversal, the whole record has to be simulated.
         with suppress(DataError):
             beginning = data[float(data.t[0]) : float(data.t[BEGINNING])]
             part, cost = beginning, lowest(objective_of(beginning, "virgin"))
@@ -101,7 +92,7 @@ def other_histories(
         "settled": objective_of(part, "settled"),
         "fit": fitted,
     }
-    settled, before = (Gaining(name, lowest(one) / cost) for name, one in objectives.items())
+    settled, before = (EarlierMotion(name, lowest(one) / cost) for name, one in objectives.items())
     gaining = [before] if before.share < (1.0 - GAIN) * settled.share else [settled, before]
     return [one for one in gaining if one.share < 1.0 - GAIN]
 

@@ -1,16 +1,14 @@
-"""Identification of a stage model by a particle swarm."""
+"""Identification of a model whose parameters are searched, by descents or a particle swarm."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.messages import quoted
 from ..._support.progress_bar import ProgressBar
 from ..._support.units import of_drive
-from ...errors import Interrupted, ParameterError
+from ...errors import Interrupted
 from ...stages.registry import stage_class
 from ..fitted.drift import Drift
 from ..fitted.estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
@@ -21,53 +19,36 @@ from ..fitted.notes import deviation_of
 from ..fitted.start import start_after
 from ..methods.descents import Descents
 from ..methods.particle_swarm import ParticleSwarm
-from ..problem.problem import question_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Mapping
 
     from ...stages.model_info import ModelInfo
-    from ..problem.records import Asked
+    from ..problem.problem import Problem
+    from ..problem.records import Record
+    from .run import Run
 
-__all__ = ["search_records"]
+__all__ = ["search_parameters"]
 
-# Searches by default, and their names: a swarm has to be restarted to tell whether it converged.
-RUNS: dict[type, int] = {ParticleSwarm: 4, Descents: 1}
-METHODS: dict[type, str] = {ParticleSwarm: "swarm", Descents: "descents"}
-DEFAULT = "descents"
+# Independent swarms by default: a swarm has to be restarted to tell whether it converged.
+SWARMS = 4
 # Unit and symbol of what is searched beside the parameters of a model.
 SENSOR = {"delay": ("s", "Td"), "voltage_before": ("V", "u0"), "drift_time": ("s", "tau")}
 
 
-def search_records(
-    records: Sequence[Asked],
-    info: ModelInfo,
-    *,
-    method: object = None,
-    swarm: object = None,
-    descents: object = None,
-    seed: object = None,
-    runs: object = None,
-    threads: object = None,
-    progress: bool | None = None,
-    callback: object = None,
-    checkpoint: _core.Checkpoint | None = None,
-    **asked: object,
+def search_parameters(
+    problem: Problem, method: Descents | ParticleSwarm, run: Run
 ) -> Identification:
     """Search the parameters of a model on one record or several, by descents or with a swarm.
 
     Parameters
     ----------
-    records : sequence of Asked
-        The records, each with what is asked of it alone.
-    info : ModelInfo
-        The model.
-    method, swarm, descents, seed, runs, threads, progress, callback
-        As for `identify`, not yet checked; None stands for the default.
-    checkpoint : _core.Checkpoint or None
-        What the search keeps its simulations in.
-    **asked
-        As for `question_of`.
+    problem : Problem
+        The model, the records and what is known of the parameters.
+    method : Descents or ParticleSwarm
+        What searches.
+    run : Run
+        How it is run.
 
     Returns
     -------
@@ -79,51 +60,27 @@ def search_records(
     ParameterError, DataError, NumericalError, Interrupted
         As for `identify`.
     """
-    settings = _settings(method, swarm, descents)
-    if callback is not None and not callable(callback):
-        raise ParameterError(f"callback is {quoted(callback)}: expected a function, or None")
-    seed = 0 if seed is None else _core.as_count("seed", seed)
-    questions = [question_of(one, info, **asked) for one in records]
-    with ProgressBar(progress, f"identify: {info.name}") as bar:
+    problem.check_data()
+    info, callback = problem.info, run.callback
+    with ProgressBar(run.progress, f"identify: {info.name}") as bar:
         found = _core.identify(
-            questions,
-            method=settings._core,
-            seed=seed,
-            runs=RUNS[type(settings)] if runs is None else _core.as_count("runs", runs),
-            threads=0 if threads is None else _core.as_count("threads", threads),
+            problem,
+            method=method._core,
+            seed=method.seed,
+            runs=SWARMS if method.runs is None else method.runs,
+            threads=run.threads,
             callback=None if callback is None else _reporting(info, callback),
             progress=bar.update,
-            checkpoint=checkpoint,
+            checkpoint=run.checkpoint,
         )
     if found is None:
         raise Interrupted("interrupted before the first cost was computed")
-    fit = _identification(info, found, records, settings, seed, dict(questions[0]["scales"]))
+    fit = _identification(problem, found, method)
     if not fit.success:
         raise Interrupted(
             f"interrupted after {fit.nfev} simulations, best cost {fit.cost_um:.4g} um", fit
         )
     return fit
-
-
-def _settings(method: object, swarm: object, descents: object) -> ParticleSwarm | Descents:
-    """Return the settings of the method that is asked for, by its name or by its settings."""
-    given = {"swarm": swarm, "descents": descents}
-    named = [name for name, value in given.items() if value is not None]
-    method = method if method is not None else named[0] if named else DEFAULT
-    if method not in given:
-        raise ParameterError(f"method is {quoted(method)}: expected 'descents' or 'swarm'")
-    for name in named:
-        if name != method:
-            raise ParameterError(
-                f"{name} is {quoted(given[name])}: expected none, as the method is {method!r}"
-            )
-    kind = ParticleSwarm if method == "swarm" else Descents
-    settings = given[str(method)]
-    if settings is not None and not isinstance(settings, kind):
-        raise ParameterError(
-            f"{method} is {quoted(settings)}: expected pt.{kind.__name__}, as pt.{kind.__name__}()"
-        )
-    return kind() if settings is None else settings
 
 
 def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Callable[..., bool]:
@@ -140,13 +97,9 @@ def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Calla
 
 
 def _identification(
-    info: ModelInfo,
-    found: _core.Search,
-    records: Sequence[Asked],
-    settings: ParticleSwarm | Descents,
-    seed: int,
-    scales: Mapping[str, str],
+    problem: Problem, found: _core.Search, method: Descents | ParticleSwarm
 ) -> Identification:
+    info, records = problem.info, problem.records
     drive_unit = records[0].data.drive_unit
     facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | SENSOR
     facts = {name: (of_drive(unit, drive_unit), sign) for name, (unit, sign) in facts.items()}
@@ -181,7 +134,7 @@ def _identification(
             "substeps": found.substeps,
             "order": found.order,
         },
-        "provenance": provenance(data, seed=seed, **{METHODS[type(settings)]: asdict(settings)}),
+        "provenance": provenance(data, seed=method.seed, **{method.name: method.settings()}),
     }
     return Identification(
         lags=None if found.lags is None else LagRange(*found.lags),
@@ -198,7 +151,7 @@ def _identification(
         data=data,
         parameters=parameters,
         constraints=constraints,
-        scales=scales,
+        scales={name: one.scale for name, one in problem.parameters.items() if one.scale},
         cost=found.rms,
         cost_with_priors=found.rms_with_priors,
         history=found.history,
@@ -210,10 +163,10 @@ def _identification(
         runs=tuple(SwarmRun(*run) for run in found.runs),
         substeps=found.substeps,
         order=found.order,
-        seed=seed,
+        seed=method.seed,
         agreeing=found.agreeing,
-        swarm=settings if isinstance(settings, ParticleSwarm) else None,
-        descents=settings if isinstance(settings, Descents) else None,
+        swarm=method if isinstance(method, ParticleSwarm) else None,
+        descents=method if isinstance(method, Descents) else None,
     )
 
 
@@ -227,10 +180,10 @@ def _estimate(found: Mapping[str, Any], unit: str, symbol: str) -> Estimate:
 
 
 def _fitted(
-    model: Any, asked: Asked, own: Mapping[str, Any], facts: Mapping[str, tuple[str, str]]
+    model: Any, record: Record, own: Mapping[str, Any], facts: Mapping[str, tuple[str, str]]
 ) -> FittedRecord:
     """Return what a search found of a record alone."""
-    data, history = asked.data, asked.history or "virgin"
+    data, history = record.data, record.history or "virgin"
     estimates = {name: _estimate(own[name], *facts[name]) for name in SENSOR}
     delay, before, time = (estimates[name] for name in SENSOR)
     if delay.value == 0.0 and not delay.free:
@@ -245,10 +198,10 @@ def _fitted(
     voltage = before.value if history == "fit" else None
     return FittedRecord(
         data=data,
-        weight=asked.weight,
+        weight=record.weight,
         delay=delay.value,
         offset=own["offset"],
-        offset_fitted=asked.offset,
+        offset_fitted=record.offset,
         drift=drift,
         start=start_after(model, data, history, voltage, creeps=False),
         cost=own["rms"],

@@ -1,22 +1,19 @@
-"""`model="auto"`: the kind that is best on a part of the record that was not fitted."""
+"""`model="auto"`: the model that is best on a part of the record that was not fitted."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ... import _core
-from ..._support.messages import quoted
 from ..._support.statistics import sample_noise
-from ...errors import DataError, NumericalError, ParameterError
+from ...errors import DataError, NumericalError
 from ...stages.registry import model_named
 from ..fitted.trial import Trial
-from ..methods.particle_swarm import ParticleSwarm
-from ..problem.parameters import ON_PARAMETERS
-from .one_model import check_counts, identify_kind
+from .one_model import identify_model
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,28 +23,17 @@ if TYPE_CHECKING:
     from ...data.dataset import Dataset
     from ...stages.model_info import ModelInfo
     from ..fitted.identification import Identification
-    from ..problem.records import Asked
+    from ..methods.choice import MethodChoice
+    from ..problem.problem import Problem
+    from .run import Run
 
     Array = NDArray[np.float64]
 
-__all__ = [
-    "AUTO",
-    "identify_best",
-    "is_white",
-    "kinds_tried",
-    "refuse_of_one_model",
-    "short_trials",
-    "two_parts",
-]
+__all__ = ["best_of_several", "identify_best", "is_white", "models_tried", "two_parts"]
 
-AUTO = "auto"
-# Kinds that are tried for a drive in volts, and for a force.
+# Models that are tried for a drive in volts, and for a force.
 OF_VOLTS = ("prandtl-ishlinskii", "first-order-dahl", "parallel-dahl", "bouc-wen")
 OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
-# Arguments that name parameters of one model.
-OF_ONE_MODEL = ("free", "fixed", "initial", "bounds", *ON_PARAMETERS)
-# Arguments that least squares cannot follow.
-OF_SWARM_ONLY = ("stiffness",)
 # Share of the window that is fitted, and turns of the drive that each part needs.
 FITTED, TURNS = 0.6, 2
 # A residual of so many times the noise, on what was not fitted, is good enough to try no more.
@@ -55,47 +41,42 @@ AS_NOISE = 1.5
 # Correlation of residuals up to so many samples apart that is that of noise; and what chance makes
 # of it, in standard deviations.
 APART, CORRELATED, CHANCE = 10, 0.1, 4.0
-# Another kind has to be better by this share than one before it in the list.
+# Another model has to be better by this share than one before it in the list.
 BETTER = 0.03
-# The descent finds the bottom: swarms that only have to find the basin can be short, and those
-# that only have to tell the kinds apart few.
-ITERATIONS, RUNS = 40, 2
 
 
-def identify_best(
-    one: Asked, *, of_swarm: Mapping[str, Any], least_squares: object
-) -> Identification:
-    """Identify the kind of stage that describes a record best.
+def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identification:
+    """Identify the model that describes a record best.
 
     Parameters
     ----------
-    one : Asked
-        The record, and what is asked of it.
-    of_swarm, least_squares : mapping, object
-        As for `identify`, not yet checked.
+    problem : Problem
+        One record, of any model.
+    methods : MethodChoice
+        The methods.
+    run : Run
+        How it is run.
 
     Returns
     -------
     Identification
-        The best kind, fitted to the whole window.
+        The best model, fitted to the whole window.
 
     Raises
     ------
     ParameterError, DataError, NumericalError, Interrupted
         As for `identify`.
     """
-    refuse_of_one_model(of_swarm)
-    several, swarm = short_trials(of_swarm)
-    infos = kinds_tried(one.data, of_swarm)
-    part, rest = two_parts(one.data)
+    (record,) = problem.records
+    part, rest = two_parts(record.data)
     noise = sample_noise(rest.y)
-    trial = several if rest is not part else swarm
+    first = replace(problem, records=(replace(record, data=part),))
+    of_trials = methods.of_trials() if rest is not part else methods
     found: list[tuple[Trial, ModelInfo]] = []
     refused: Exception | None = None
-    for info in infos:
+    for info in models_tried(problem.records[0].data, problem.parameters):
         try:
-            asked = replace(one, data=part)
-            fit = identify_kind(asked, info, of_swarm=trial, least_squares=least_squares)
+            fit = identify_model(first.of_model(info), of_trials.method(info), run)
             score = fit.score(rest, offset=fit.offset) if rest is not part else fit.fitted
         except (DataError, NumericalError) as error:
             refused = refused or error
@@ -111,8 +92,68 @@ def identify_best(
     best, info = best_of(found)
     whole = fit if rest is part and best is found[-1][0] else None
     if whole is None:
-        whole = identify_kind(one, info, of_swarm=swarm, least_squares=least_squares)
+        whole = identify_model(problem.of_model(info), methods.method(info), run)
     return with_trials(whole, found, None if rest is part else float(part.t[-1]))
+
+
+def best_of_several(problem: Problem, methods: MethodChoice, run: Run) -> Identification:
+    """Identify the model that describes several records best.
+
+    Parameters
+    ----------
+    problem : Problem
+        The records, of any model.
+    methods, run : MethodChoice, Run
+        As for `identify_best`.
+
+    Returns
+    -------
+    Identification
+        The best model, fitted to the whole windows. The trials were fitted to the first part of
+        each window and judged on the rest of each.
+
+    Raises
+    ------
+    ParameterError, DataError, NumericalError, Interrupted
+        As for `identify`.
+    """
+    records = problem.records
+    pairs = [two_parts(one.data) for one in records]
+    apart = all(part is not rest for part, rest in pairs)
+    of_trials = methods.of_trials() if apart else methods
+    first, rests = problem, [one.data for one in records]
+    if apart:
+        halves = zip(records, pairs, strict=True)
+        first = replace(
+            problem, records=tuple(replace(one, data=part) for one, (part, _) in halves)
+        )
+        rests = [rest for _, rest in pairs]
+    counts = np.array([one.weight * len(rest) for one, rest in zip(records, rests, strict=True)])
+    found: list[tuple[Trial, ModelInfo]] = []
+    refused: Exception | None = None
+    fit: Identification | None = None
+    for info in models_tried(problem.records[0].data, problem.parameters):
+        try:
+            fit = identify_model(first.of_model(info), of_trials.method(info), run)
+            left = [
+                rest.y - fit.simulate(rest, offset=own.offset).x
+                for rest, own in zip(rests, fit.records, strict=True)
+            ]
+        except (DataError, NumericalError) as error:
+            refused = refused or error
+            continue
+        rms = np.array([math.sqrt(float(np.mean(one**2))) for one in left])
+        whole = math.sqrt(float(counts @ rms**2) / float(counts.sum()))
+        found.append((Trial(info.name, info.title, whole), info))
+        noise = [sample_noise(rest.y) for rest in rests]
+        if np.all(rms < AS_NOISE * np.array(noise)) and all(is_white(one) for one in left):
+            break
+    if not found or fit is None:
+        raise refused or DataError("no kind of stage could be fitted")
+    best, info = best_of(found)
+    if apart or best is not found[-1][0]:
+        fit = identify_model(problem.of_model(info), methods.method(info), run)
+    return with_trials(fit, found, float(first.records[0].data.t[-1]) if apart else None)
 
 
 def best_of(found: Sequence[tuple[Trial, ModelInfo]]) -> tuple[Trial, ModelInfo]:
@@ -143,7 +184,7 @@ def with_trials(
     Parameters
     ----------
     fit : Identification
-        The best kind.
+        The best model.
     found : sequence of (Trial, ModelInfo)
         What was tried.
     until : float or None
@@ -160,69 +201,24 @@ def with_trials(
     return replace(fit, trials=trials, fitted_until=until, details={**fit.details, **details})
 
 
-def refuse_of_one_model(of_swarm: Mapping[str, Any]) -> None:
-    """Refuse arguments that name parameters of one model, and counts that are none.
-
-    Parameters
-    ----------
-    of_swarm : mapping
-        As for `identify_best`.
-
-    Raises
-    ------
-    ParameterError
-        One is given.
-    """
-    for name in OF_ONE_MODEL:
-        if of_swarm[name] is not None:
-            raise ParameterError(
-                f"{name} is {quoted(of_swarm[name])}: expected none with model='auto'; name the "
-                "model whose parameters these are, as model='dahl'"
-            )
-    check_counts(of_swarm)
-
-
-def short_trials(of_swarm: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the arguments of the trials on a part, and those of the fit of the best kind.
-
-    Parameters
-    ----------
-    of_swarm : mapping
-        As for `identify_best`.
-
-    Returns
-    -------
-    trial, full : dict
-        The same, but for the size of swarms.
-    """
-    full = dict(of_swarm)
-    if full["method"] == "swarm" and full["swarm"] is None:
-        full["swarm"] = ParticleSwarm(iterations=ITERATIONS)
-    trial = dict(full)
-    if trial["runs"] is None and trial["swarm"] is not None:
-        trial["runs"] = RUNS
-    return trial, full
-
-
-def kinds_tried(data: Dataset, of_swarm: Mapping[str, Any]) -> list[ModelInfo]:
-    """Return the kinds that can be fitted with what the caller gives.
+def models_tried(data: Dataset, parameters: Mapping[str, object]) -> list[ModelInfo]:
+    """Return the models that can be fitted with what the caller gives.
 
     Parameters
     ----------
     data : Dataset
-        The record.
-    of_swarm : mapping
-        As for `identify_best`.
+        The record, or the first of several.
+    parameters : mapping
+        The parameters of which something is said.
 
     Returns
     -------
     list of ModelInfo
-        In the order in which they are tried.
+        In the order in which they are tried; where a parameter is given, those that are searched.
     """
     names = OF_FORCE if data.drive_unit == "N" else OF_VOLTS
     infos = [model_named(name) for name in names]
-    needs_swarm = any(of_swarm.get(name) is not None for name in OF_SWARM_ONLY)
-    return [info for info in infos if info.searched or not needs_swarm]
+    return [info for info in infos if info.searched or not parameters]
 
 
 def two_parts(data: Dataset) -> tuple[Dataset, Dataset]:

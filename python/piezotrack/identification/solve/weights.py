@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
+from ..._support.messages import quoted
+from ...errors import DataError, ParameterError
 from ...stages.registry import stage_class
-from ..fitted.drift import Drift, asked_drift, drift_of_asked
+from ..fitted.drift import Drift
 from ..fitted.estimates import LagRange
 from ..fitted.fitted_record import FittedRecord
 from ..fitted.identification import Identification
 from ..fitted.model_entries import fit_entry, origin_of, provenance
 from ..fitted.notes import deviation_of
 from ..fitted.start import start_of_fit
-from ..problem.problem import delay_bounds
-from ..problem.records import of_record
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
+    from ...data.dataset import Dataset
     from ...stages.model_info import ModelInfo
     from ..methods.least_squares import LeastSquares
-    from ..problem.records import Asked
+    from ..problem.problem import Problem
+    from ..problem.records import Record
 
 __all__ = ["solve_least_squares"]
 
+MOST_RELAXATIONS = 8
 DYNAMICS = ("time_constant", "frequency", "damping_ratio")
 # Parameters that the settings and the record fix beforehand.
 CHOSEN = (
@@ -42,17 +44,14 @@ CHOSEN = (
 
 
 def solve_least_squares(
-    records: Sequence[Asked], info: ModelInfo, settings: LeastSquares, threads: int = 0
+    problem: Problem, settings: LeastSquares, threads: int = 0
 ) -> Identification:
     """Identify a stage by least squares.
 
     Parameters
     ----------
-    records : sequence of Asked
-        The records, each with what is asked of it alone. The drive before a window is warm-up:
-        simulated, not scored.
-    info : ModelInfo
-        The model.
+    problem : Problem
+        The model and the records. The drive before a window is warm-up: simulated, not scored.
     settings : LeastSquares
         Settings.
     threads : int, optional
@@ -69,17 +68,17 @@ def solve_least_squares(
         A record does not determine the weights: its drive or its displacement is constant, the
         drive never reverses, or the window is too short.
     ParameterError
-        What is asked of a record cannot be used.
+        A setting or what is fitted of a record cannot be used.
     """
+    info, records = problem.info, problem.records
     data = records[0].data
     longest = max((one.data for one in records), key=lambda one: one.duration)
     found = _core.identify_weights(
-        [_asked(one) for one in records],
-        model=info.name,
+        problem,
         count=settings.count,
-        thresholds=settings._places(info),
-        zones=settings._zones(info),
-        creep_times=settings._times(longest),
+        thresholds=_places(settings, info),
+        zones=_zones(settings, info),
+        creep_times=_times(settings, longest),
         dynamics=settings.dynamics or "none",
         threads=threads,
     )
@@ -93,14 +92,14 @@ def solve_least_squares(
             one.name: {"free": one.name not in CHOSEN and one.held is None}
             for one in info.parameters
         },
-        "delay": {"free": True} if _is_searched(records[0]) else {},
+        "delay": {"free": True} if records[0].fits_delay else {},
         "fit": {
             **fit_entry(found.rms, data, None, spread),
             "simulations": found.evaluations,
             "at_bound": found.at_bound,
             "lag_range": {"value": found.lag_range, "unit": "s"},
         },
-        "provenance": provenance(data, least_squares=asdict(settings)),
+        "provenance": provenance(data, least_squares=settings.settings()),
     }
     return Identification(
         model=model._from(found.parameters),
@@ -122,40 +121,51 @@ def solve_least_squares(
     )
 
 
-def _asked(one: Asked) -> dict[str, Any]:
-    """Return a record and what is asked of it, as the core takes it."""
-    data = one.data
-    with of_record(one.label):
-        delay = delay_bounds(one.delay)
-        drift = drift_of_asked(one.drift, offset=one.offset, searched=False)
-    return {
-        "u": data.full.u,
-        "y": data.full.y,
-        "dt": data.dt,
-        "hold_name": data.hold,
-        "start": data.warmup,
-        "history": one.history,
-        "offset": one.offset,
-        "drift": drift,
-        "delay": delay,
-        "label": one.label,
-        "weight": one.weight,
-    }
+def _places(settings: LeastSquares, info: ModelInfo) -> list[float] | None:
+    """Thresholds or levels that are given, whichever the model has."""
+    places = None
+    for name, given in (("thresholds", settings.thresholds), ("levels", settings.levels)):
+        if given is not None and name != info.places:
+            raise ParameterError(
+                f"{name} is {quoted(given)}: expected None, as {info.title} has no {name}"
+            )
+        places = places if given is None else list(given)
+    return places
 
 
-def _is_searched(one: Asked) -> bool:
-    bounds = delay_bounds(one.delay)
-    return bounds is None or bounds[0] < bounds[1]
+def _zones(settings: LeastSquares, info: ModelInfo) -> int:
+    """Return the number of dead zones."""
+    if settings.dead_zones is True:
+        return 2 if info.has_dead_zones else 0
+    return int(settings.dead_zones)
 
 
-def _fitted(model: Any, info: ModelInfo, one: Asked, own: Mapping[str, Any]) -> FittedRecord:
+def _times(settings: LeastSquares, data: Dataset) -> list[float] | None:
+    """Time constants of the creep [s]; None where the record shows them."""
+    if isinstance(settings.creep, str):
+        return None
+    if not isinstance(settings.creep, bool):
+        return list(settings.creep)
+    if not settings.creep:
+        return []
+    shortest, longest = 5.0 * data.dt, 0.5 * data.duration
+    decades = [10.0**k for k in range(-9, 10) if shortest <= 10.0**k <= longest]
+    if not decades:
+        raise DataError(
+            f"the window of {data.duration:.4g} s is too short to show creep: expected at "
+            f"least {20.0 * shortest:.4g} s, or creep=False"
+        )
+    return decades[-MOST_RELAXATIONS:]
+
+
+def _fitted(model: Any, info: ModelInfo, one: Record, own: Mapping[str, Any]) -> FittedRecord:
     """Return what was found of a record alone."""
     data = one.data
     drift, offset = None, own["offset"]
     if own["drift"] is not None:
         amplitude, time = own["drift"]
         begin, end = float(data.t[0]), float(data.t[-1])
-        fitted = asked_drift(one.drift) is None
+        fitted = one.fits_drift_time
         drift = Drift(amplitude=amplitude, time=time, begin=begin, end=end, time_fitted=fitted)
         # What the sensor shows at rest at the end of the window.
         offset += amplitude * math.exp((begin - end) / time)

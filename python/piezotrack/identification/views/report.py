@@ -168,7 +168,7 @@ def _estimates(fit: Identification) -> list[str]:
         lines += [
             "parameters, scale assumed: a log of drive and displacement determines no force, so",
             f"K = {fit.model.stiffness:g} N/m was assumed. {fit.model.info.force_symbols} scale "
-            "with it; for real values give stiffness=.",
+            "with it; for real values give the stiffness.",
         ]
     else:
         lines.append("parameters")

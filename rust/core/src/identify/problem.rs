@@ -11,7 +11,7 @@ use super::parameters::tie::shown_text;
 use super::records::creep_shares::check_times;
 use super::records::history::{History, came_from};
 use super::records::record::Record;
-use crate::error::{Error, Result, positive};
+use crate::error::{Error, Result, finite, positive};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{FoundBy, Held, Measures, Model, NOMINAL_STIFFNESS, position};
 use crate::signal::Stop;
@@ -21,14 +21,13 @@ use crate::signal::Stop;
 pub struct Spec {
     /// The kind of stage.
     pub model: Model,
-    /// Parameters to search; all that are not fixed where `None`.
-    pub free: Option<Vec<String>>,
+    /// Parameters that are searched although the model holds them by default, or the record does
+    /// not show them; as are those with bounds, a scale or a prior, and all without a value.
+    pub free: Vec<String>,
     /// Parameters held, SI.
     pub fixed: Vec<(String, f64)>,
     /// Bounds, SI.
     pub bounds: Vec<(String, (f64, f64))>,
-    /// The stiffness where it is known, N/m.
-    pub stiffness: Option<f64>,
     /// Whether a constant offset of the displacement is fitted with the rest.
     pub offset: bool,
     /// Delay of the displacement, s.
@@ -55,10 +54,9 @@ impl Spec {
     pub fn of(model: Model) -> Self {
         Self {
             model,
-            free: None,
+            free: Vec::new(),
             fixed: Vec::new(),
             bounds: Vec::new(),
-            stiffness: None,
             offset: false,
             delay: Delay::default(),
             drift: DriftKind::None,
@@ -73,6 +71,18 @@ impl Spec {
 
     fn scales(&self, name: &str) -> bool {
         self.scales.iter().any(|(other, _)| other == name)
+    }
+
+    fn frees(&self, name: &str) -> bool {
+        self.free.iter().any(|other| other == name)
+    }
+
+    /// Names of the parameters of which something is said that only a searched one has.
+    fn searched(&self) -> impl Iterator<Item = &str> {
+        let bounded = self.bounds.iter().map(|(name, _)| name);
+        let scaled = self.scales.iter().map(|(name, _)| name);
+        let known = self.priors.iter().map(|(name, _)| name);
+        self.free.iter().chain(bounded).chain(scaled).chain(known).map(String::as_str)
     }
 }
 
@@ -144,7 +154,7 @@ impl Problem {
             records.iter().map(|record| record.window.len()).sum(),
         )?;
         check_tied(spec, &relations, &mut fixed)?;
-        let free = free_parameters(spec, &relations, &mut fixed)?;
+        let free: Free = core::array::from_fn(|i| fixed[i].is_none() && !relations.is_tied(i));
         let has_scale = infos.iter().any(|info| info.carries_force);
         let holds_scale = !has_scale
             || infos
@@ -153,14 +163,12 @@ impl Problem {
                 .any(|(info, value)| info.carries_force && value.is_some_and(|v| v != 0.0));
         let mut scale_assumed = false;
         if !holds_scale {
-            let asked =
-                spec.free.as_ref().is_some_and(|names| names.iter().any(|n| n == "stiffness"));
-            if asked {
+            if spec.frees("stiffness") {
                 return Err(Error::parameter(
-                    "free",
-                    "every parameter that carries force",
-                    "one of them held: voltage and displacement determine only their ratios \
-                     (give stiffness=, or name one in fixed=)",
+                    "stiffness",
+                    "searched, as every parameter that carries force",
+                    "one of them held in parameters=: voltage and displacement determine only \
+                     their ratios",
                 ));
             }
             let stiffness = position(infos, "stiffness", "stiffness")?;
@@ -177,8 +185,7 @@ impl Problem {
         }
         check_fixed(spec.model, &fixed)?;
         let mut coordinates = [Coordinate::Fixed(0.0); PLACES];
-        let names_mass = spec.free.as_ref().is_some_and(|names| names.iter().any(|n| n == "mass"));
-        let wants_mode = names_mass || spec.scales("mass");
+        let wants_mode = spec.frees("mass") || spec.scales("mass");
         let known = relations.known(&fixed);
         let derived = bounds::derive(&records, spec.model, &known, wants_mode, stop)?;
         coordinates[..DELAY].copy_from_slice(&derived);
@@ -188,7 +195,7 @@ impl Problem {
             return Err(Error::parameter(
                 "bounds of stiffness",
                 "given, while no parameter that carries force is held",
-                "stiffness=, or a value other than 0 for another of them in fixed=",
+                "a value for it, or one other than 0 for another of them, in parameters=",
             ));
         }
         let bounded = |name: &str| spec.bounds.iter().any(|(other, _)| other == name);
@@ -223,7 +230,7 @@ impl Problem {
         };
         let all: Vec<Self> = asked.iter().map(searched).collect::<Result<_>>()?;
         if all.iter().all(|one| one.free().count() == 0) {
-            return Err(Error::parameter("free", "empty", "at least one parameter to search"));
+            return Err(Error::parameter("parameters", "all held", "at least one to search"));
         }
         Ok(all)
     }
@@ -344,29 +351,28 @@ fn mass_if_shown(
     fixed[mass].is_none().then(|| Coordinate::between("mass", least, most).ok())?
 }
 
-/// Values of `fixed=` and `stiffness=`, with the model's defaults.
+/// Values of the parameters that are held: as given, or the model's defaults of those of which
+/// nothing is said.
 fn fixed_values(spec: &Spec) -> Result<Fixed> {
     let infos = spec.model.scalars();
-    let mut fixed: Fixed = [None; MOST_PARAMETERS];
+    let mut given: Fixed = [None; MOST_PARAMETERS];
     for (name, value) in &spec.fixed {
-        let i = position(infos, "fixed", name)?;
-        fixed[i] = Some(crate::error::finite(&format!("fixed {name}"), *value, infos[i].unit)?);
-    }
-    if let Some(stiffness) = spec.stiffness {
-        positive("stiffness", stiffness, "N/m")?;
-        let i = position(infos, "stiffness", "stiffness")?;
-        if fixed[i].is_some_and(|value| value.to_bits() != stiffness.to_bits()) {
-            return Err(Error::parameter(
-                "stiffness",
-                format!("{stiffness} N/m"),
-                "the value given for it in fixed=, or only one of the two",
-            ));
-        }
-        fixed[i] = Some(stiffness);
+        let i = position(infos, "parameters", name)?;
+        // A stiffness of 0 fixes no force, in place of which a nominal one would be held.
+        let check = if name == "stiffness" { positive } else { finite };
+        given[i] = Some(check(name, *value, infos[i].unit)?);
     }
     let defaults = Held::defaults(infos).values;
-    for (value, default) in fixed.iter_mut().zip(defaults) {
-        *value = value.or(default);
+    let mut fixed: Fixed = core::array::from_fn(|i| given[i].or(defaults[i]));
+    for name in spec.searched() {
+        let i = position(infos, "parameters", name)?;
+        if given[i].is_some() {
+            continue;
+        }
+        if let Some(reason) = infos[i].held {
+            return Err(Error::parameter("parameters", name, reason));
+        }
+        fixed[i] = None;
     }
     Ok(fixed)
 }
@@ -382,12 +388,12 @@ fn check_fixed(model: Model, fixed: &Fixed) -> Result<()> {
 fn enter_bounds(spec: &Spec, free: &Free, coordinates: &mut [Coordinate; PLACES]) -> Result<()> {
     let infos = spec.model.scalars();
     for (name, (low, high)) in &spec.bounds {
-        let i = position(infos, "bounds", name)?;
+        let i = position(infos, "parameters", name)?;
         if !free[i] {
             return Err(Error::parameter(
                 format!("bounds of {name}"),
                 format!("({low}, {high})"),
-                "no bounds, as this parameter is not free",
+                "no bounds, as this parameter is held",
             ));
         }
         coordinates[i] = Coordinate::between(name, *low, *high)?;
@@ -399,7 +405,7 @@ fn enter_bounds(spec: &Spec, free: &Free, coordinates: &mut [Coordinate; PLACES]
 fn enter_scales(spec: &Spec, coordinates: &mut [Coordinate; PLACES]) -> Result<()> {
     let infos = spec.model.scalars();
     for (name, scale) in &spec.scales {
-        let i = position(infos, "scales", name)?;
+        let i = position(infos, "parameters", name)?;
         coordinates[i] = coordinates[i].on(Scale::named(name, scale)?, name)?;
     }
     Ok(())
@@ -407,57 +413,21 @@ fn enter_scales(spec: &Spec, coordinates: &mut [Coordinate; PLACES]) -> Result<(
 
 /// Refuses what else is said of a tied parameter, and takes its default away.
 fn check_tied(spec: &Spec, relations: &Relations, fixed: &mut Fixed) -> Result<()> {
-    let stiffness = spec.stiffness.map(|_| "stiffness");
     for tie in &relations.ties {
         let name = spec.model.scalars()[tie.parameter].name;
-        let arguments = [
-            ("free=", spec.free.iter().flatten().any(|other| other == name)),
-            ("fixed=", spec.fixed.iter().any(|(other, _)| other == name)),
-            ("bounds=", spec.bounds.iter().any(|(other, _)| other == name)),
-            ("scales=", spec.scales(name)),
-            ("stiffness=", stiffness == Some(name)),
+        let beside = [
+            ("value", spec.fixed.iter().any(|(other, _)| other == name)),
+            ("bounds", spec.bounds.iter().any(|(other, _)| other == name)),
+            ("scale", spec.scales(name)),
         ];
-        if let Some((argument, _)) = arguments.iter().find(|(_, given)| *given) {
+        if let Some((said, _)) = beside.iter().find(|(_, given)| *given) {
             return Err(Error::parameter(
                 format!("tie of {name}"),
                 shown_text(&tie.text),
-                format!("{name} not in {argument} as well"),
+                format!("no {said} of {name} besides"),
             ));
         }
         fixed[tie.parameter] = None;
     }
     Ok(())
-}
-
-/// Which parameters are searched; each of the others must have a value or be tied.
-fn free_parameters(spec: &Spec, relations: &Relations, fixed: &mut Fixed) -> Result<Free> {
-    let Some(names) = &spec.free else {
-        return Ok(core::array::from_fn(|i| fixed[i].is_none() && !relations.is_tied(i)));
-    };
-    let infos = spec.model.scalars();
-    let mut free: Free = [false; MOST_PARAMETERS];
-    for name in names {
-        let i = position(infos, "free", name)?;
-        let given = spec.fixed.iter().any(|(other, _)| other == name);
-        if given || (name == "stiffness" && fixed[i].is_some()) {
-            return Err(Error::parameter("free", name, "a parameter that is not fixed as well"));
-        }
-        if let Some(reason) = infos[i].held {
-            return Err(Error::parameter("free", name, reason));
-        }
-        free[i] = true;
-        fixed[i] = None;
-    }
-    for (i, info) in infos.iter().enumerate() {
-        // The stiffness may still be assumed.
-        let scale = info.name == "stiffness" && info.carries_force;
-        if !free[i] && fixed[i].is_none() && !scale && !relations.is_tied(i) {
-            return Err(Error::parameter(
-                "free",
-                names.join(", "),
-                format!("{} as well, or a value for it in fixed=", info.name),
-            ));
-        }
-    }
-    Ok(free)
 }

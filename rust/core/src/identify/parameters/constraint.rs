@@ -43,7 +43,7 @@ impl Constraint {
             return Err(refused(form));
         }
         if [left, right].iter().any(|side| side.parse::<f64>().is_ok()) {
-            return Err(refused("two parameters, as bounds= keep one on a side of a number"));
+            return Err(refused("two parameters, as bounds keep one on a side of a number"));
         }
         let place = |name: &str| {
             let known = infos.iter().any(|info| info.name == name);

@@ -35,14 +35,14 @@ impl Relations {
         samples: usize,
     ) -> Result<Self> {
         let tie = |(name, text): &(String, String)| {
-            let place = position(infos, "ties", name)?;
+            let place = position(infos, "parameters", name)?;
             if let Some(reason) = infos[place].held {
                 return Err(Error::parameter(format!("tie of {name}"), shown_text(text), reason));
             }
             Tie::read(infos, place, text)
         };
         let prior = |(name, (mean, width)): &(String, (f64, f64))| {
-            let place = position(infos, "priors", name)?;
+            let place = position(infos, "parameters", name)?;
             Prior::new(&infos[place], place, *mean, *width)
         };
         let ties: Result<Vec<Tie>> = ties.iter().map(tie).collect();
@@ -127,7 +127,7 @@ impl Relations {
                 continue;
             }
             if !free[place] {
-                return Err(prior.refuse(info, "none, as this parameter is not free"));
+                return Err(prior.refuse(info, "none, as this parameter is held"));
             }
             let valid = |value: f64| {
                 let at = |i: usize| if i == place { value } else { held[i].unwrap_or(1.0) };

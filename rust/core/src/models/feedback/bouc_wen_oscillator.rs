@@ -40,7 +40,7 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::new("delta", "delta", "1/m"),
     ParameterInfo::new("exponent", "nu", "")
         .or(1.0)
-        .never_searched("exponent held, in fixed=: it decides the unit of gamma and delta"),
+        .never_searched("exponent held, in parameters=: it decides the unit of gamma and delta"),
 ];
 
 const STATE: &[ParameterInfo] = &[X, V, ParameterInfo::new("force", "z", "N")];

@@ -38,7 +38,7 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::new("coulomb_force", "Fc", "N").force(),
     ParameterInfo::new("exponent", "i", "")
         .or(1.0)
-        .never_searched("exponent held, in fixed=: all candidates of a search share it"),
+        .never_searched("exponent held, in parameters=: all candidates of a search share it"),
 ];
 
 const STATE: &[ParameterInfo] = &[X, V, ParameterInfo::new("force", "F", "N")];

@@ -43,7 +43,7 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::new("static_ratio", "Fs/Fc", "").or(1.0),
     ParameterInfo::new("stribeck_velocity", "vs", "m/s").or(STRIBECK_VELOCITY),
     ParameterInfo::new("viscous_friction", "sigma2", "N s/m").force().or(0.0).never_searched(
-        "viscous_friction held, in fixed=: a record determines its sum with the damping only",
+        "viscous_friction held, in parameters=: a record determines its sum with the damping only",
     ),
 ];
 

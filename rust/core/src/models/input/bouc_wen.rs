@@ -35,7 +35,7 @@ pub(in crate::models) const PARAMETERS: &[ParameterInfo; 8] = &[
     ParameterInfo::new("gamma", "gamma", "1/V"),
     ParameterInfo::new("exponent", "n", "")
         .or(1.0)
-        .never_searched("exponent held, in fixed=: it decides the unit of beta and gamma"),
+        .never_searched("exponent held, in parameters=: it decides the unit of beta and gamma"),
 ];
 
 /// Displacement, velocity, drive and hysteresis.

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["likely_models"]
+__all__ = ["posterior_models"]
 
 # Share of a value by which it is moved to see its effect.
 STEP = 1e-4
@@ -36,7 +36,7 @@ class _Value(NamedTuple):
     entry: int | None
 
 
-def likely_models(
+def posterior_models(
     model: IdentifiedModel, data: Dataset, *, deviations: float = 2.0
 ) -> tuple[IdentifiedModel, ...]:
     r"""Move an identified model along the principal axes of its uncertainty.
@@ -50,8 +50,8 @@ def likely_models(
     over parts :math:`b` of the record (White 1982, eq. 3.2, doi 10.2307/1912526), which holds for
     deviations that are correlated within a part too, as those of a model that is not exact are.
     Each axis gives two models, one in either direction. What the record does not determine moves by
-    half of its value at most. ``pt.tune([fit, *likely_models(fit, log)], ...)`` keeps its margins
-    for all of them.
+    half of its value at most. ``pt.tune([fit, *posterior_models(fit, log)], ...)`` keeps its
+    margins for all of them.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def likely_models(
     >>> t = np.arange(0.0, 2.0, 1e-3)
     >>> log = stage.record(30.0 * (1.0 - np.cos(2.0 * np.pi * t)), 1e-3)
     >>> fit = pt.identify(log, "prandtl-ishlinskii")
-    >>> nearby = pt.identification.likely_models(fit, log)
+    >>> nearby = pt.identification.posterior_models(fit, log)
     >>> all(one.score(log).rms < 1.1 * fit.score(log).rms for one in nearby)
     True
     """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.identification import Identification, IdentifiedModel, likely_models
+from piezotrack.identification import Identification, IdentifiedModel, posterior_models
 
 DT = 2e-3
 STAGE = pt.stages.PrandtlIshlinskiiStage(
@@ -23,7 +23,7 @@ def record(seed: int) -> pt.Dataset:
 
 
 def fitted(log: pt.Dataset) -> Identification:
-    fit = pt.identify(log, "dahl", seed=1)
+    fit = pt.identify(log, "dahl", method=pt.Descents(seed=1))
     assert isinstance(fit, Identification)
     return fit
 
@@ -50,7 +50,7 @@ def test_the_spread_is_that_of_fits_to_records_with_other_noise() -> None:
     ]
     seen = float(np.std([one.model.piezo_coefficient for one in fits], ddof=1))
     log = simulated(1, parameters=true)
-    found = spread(likely_models(fits[0], log, deviations=1.0), "piezo_coefficient")
+    found = spread(posterior_models(fits[0], log, deviations=1.0), "piezo_coefficient")
     # A standard deviation of twelve is known to some 20 %.
     assert 0.5 * seen < found < 2.0 * seen
 
@@ -61,14 +61,14 @@ def test_a_model_that_is_not_exact_spreads_further_than_its_noise_says() -> None
     fit = fitted(log)
     estimate = fit.parameters["piezo_coefficient"]
     assert estimate.deviation is not None
-    found = spread(likely_models(fit, log, deviations=1.0), "piezo_coefficient")
+    found = spread(posterior_models(fit, log, deviations=1.0), "piezo_coefficient")
     assert found > 2.0 * estimate.deviation
 
 
 def test_margins_of_a_tuned_loop_hold_for_all_of_them() -> None:
     log = record(2)
     fit = pt.identify(log, "prandtl-ishlinskii")
-    nearby = likely_models(fit, log)
+    nearby = posterior_models(fit, log)
     assert len(nearby) >= 6
     controller, report = pt.tune(
         [fit, *nearby],
@@ -88,7 +88,7 @@ def test_what_a_record_does_not_determine_stays_in_its_range() -> None:
     t = np.arange(0.0, 4.0, 0.02)
     log = pt.VirtualStage.of(STAGE, noise=50e-9).record(20.0 * (1.0 - np.cos(3.0 * t)), 0.02)
     fit = fitted(log)
-    for one in likely_models(fit, log, deviations=3.0):
+    for one in posterior_models(fit, log, deviations=3.0):
         for name in ("damping", "piezo_coefficient", "a1", "b1"):
             assert 0.49 < getattr(one.model, name) / getattr(fit.model, name) < 1.51
 
@@ -97,10 +97,10 @@ def test_wrong_arguments_are_named() -> None:
     log = record(1)
     fit = fitted(log)
     with pytest.raises(pt.ParameterError, match="deviations is 0"):
-        likely_models(fit, log, deviations=0.0)
+        posterior_models(fit, log, deviations=0.0)
     with pytest.raises(pt.ParameterError, match="data is str: expected a Dataset"):
-        likely_models(fit, "log.csv")  # type: ignore[arg-type]
+        posterior_models(fit, "log.csv")  # type: ignore[arg-type]
     with pytest.raises(pt.ParameterError, match=r"model is .*: expected a pt\.IdentifiedModel"):
-        likely_models(STAGE, log)  # type: ignore[arg-type]
+        posterior_models(STAGE, log)  # type: ignore[arg-type]
     with pytest.raises(pt.ParameterError, match="data has 50 samples: expected 80 or more"):
-        likely_models(fit, log[:0.1])
+        posterior_models(fit, log[:0.1])

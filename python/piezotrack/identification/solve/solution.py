@@ -1,0 +1,45 @@
+"""The solution of a problem, by the method that its model needs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..problem.problem import AUTO
+from .one_model import identify_model
+from .selection import best_of_several, identify_best
+
+if TYPE_CHECKING:
+    from ..fitted.identification import Identification
+    from ..methods.choice import MethodChoice
+    from ..problem.problem import Problem
+    from .run import Run
+
+__all__ = ["solve"]
+
+
+def solve(problem: Problem, methods: MethodChoice, run: Run) -> Identification:
+    """Solve a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        The model, or ``"auto"``, and the records.
+    methods : MethodChoice
+        The methods, of which the one that the model needs is used.
+    run : Run
+        How it is run.
+
+    Returns
+    -------
+    Identification
+        The result.
+
+    Raises
+    ------
+    ParameterError, DataError, NumericalError, Interrupted
+        As for `identify`.
+    """
+    if problem.model != AUTO:
+        return identify_model(problem, methods.method(problem.info), run)
+    best = identify_best if len(problem.records) == 1 else best_of_several
+    return best(problem, methods, run)
