@@ -14,7 +14,7 @@ use piezotrack_control::creep::{Creep, CubicLag, Lag, advance, output};
 
 use super::creep::{Dynamics, MOST_RELAXATIONS, Relaxation};
 use super::parameters::search_ranges::{Measures, Ranges};
-use super::parameters::values::{Held, ParameterInfo, Values};
+use super::parameters::values::{Held, ParameterInfo, ROOM, Values, extended};
 use super::plant::{Plant, Settling};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
@@ -150,20 +150,6 @@ impl<M: StageModel> Creeping<M> {
         response.last = state.followed(Self::INFO.state, vec![last]);
         Ok(())
     }
-}
-
-/// Room for the parameters of any stage, or its state, with those of the creep.
-const ROOM: usize = 20;
-
-/// Descriptions with others after them.
-const fn extended(own: &[ParameterInfo], more: &[ParameterInfo]) -> [ParameterInfo; ROOM] {
-    let mut all = [ParameterInfo::new("", "", ""); ROOM];
-    let mut i = 0;
-    while i < own.len() + more.len() {
-        all[i] = if i < own.len() { own[i] } else { more[i - own.len()] };
-        i += 1;
-    }
-    all
 }
 
 impl<M: StageModel> StageModel for Creeping<M> {

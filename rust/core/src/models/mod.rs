@@ -30,6 +30,7 @@ pub use feedback::parallel_dahl::{ParallelDahlKernel, ParallelDahlStage};
 pub use input::asymmetric_bouc_wen::{AsymmetricBoucWenHysteresis, AsymmetricBoucWenStage};
 pub use input::bouc_wen::{BoucWenHysteresis, BoucWenStage};
 pub use input::input_kernel::{InputHysteresis, InputKernel};
+pub use input::input_model::InputModel;
 pub use input::input_stage::{
     InputOperator, InputStage, InputStageFlow, InputStageState, Remembering, Segmented,
 };
@@ -73,5 +74,6 @@ pub use relays::preisach_operator::{
 };
 pub use relays::reversals::{MOST_REVERSALS, Reversals};
 pub use traits::{
-    Experiment, Invertible, KernelVisitor, Method, ModelInfo, Response, Searchable, StageModel,
+    Experiment, Invertible, KernelVisitor, LumpedModel, Method, ModelInfo, Response, Searchable,
+    StageModel,
 };

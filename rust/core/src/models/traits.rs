@@ -226,34 +226,80 @@ pub(super) fn finite_state(state: Values, voltages: &[f64]) -> Result<Values> {
     Err(Error::Numerical(format!("the stage has no equilibrium at a drive of {}", shown(volts))))
 }
 
-/// Equilibrium of a model that one kernel describes.
-pub(super) fn kernel_equilibrium<M: StageModel + KernelModel>(
-    stage: &M,
-    voltages: &[f64],
-) -> Result<Values> {
-    let Instant { x, v, memory } = stage.lumped().equilibrium(voltages);
-    let state = [vec![x, v], stage.state(&memory)].concat();
-    finite_state(Values::scalars(M::INFO.state, &state), voltages)
+/// A model that one kernel describes, with its name and its inverse.
+pub trait LumpedModel: KernelModel {
+    /// Name and parts.
+    const INFO: ModelInfo;
+
+    /// The inverse, which begins with a stage that never moved.
+    type Inverse: Inverse<State: Snapshot> + Clone;
+
+    /// See [`StageModel::build`].
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    fn build(values: &Values) -> Result<Self>;
+
+    /// See [`StageModel::loop_plants`].
+    ///
+    /// # Errors
+    /// Those that it has there.
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]>;
+
+    /// The inverse for samples every `dt` seconds.
+    ///
+    /// # Errors
+    /// Names the parameter, or `dt`, that is out of its range.
+    fn inverse(&self, dt: f64) -> Result<Self::Inverse>;
 }
 
-/// Motion of a model that one kernel describes.
-pub(super) fn simulate_kernel<M: StageModel + KernelModel>(
-    stage: &M,
-    experiment: &Experiment<'_>,
-) -> Result<Option<Response>> {
-    let Experiment { drive, initial, method, accuracy, stop } = *experiment;
-    method.exponential_only()?;
-    let lumped = stage.lumped();
-    let mut start = lumped.rest();
-    if let Some(initial) = initial {
-        let state: Vec<f64> = initial.iter().filter_map(|(_, n)| n.first().copied()).collect();
-        let [x, v] = leading(&state);
-        start = Instant { x, v, memory: stage.memory(&state) };
+impl<M: LumpedModel> StageModel for M {
+    const INFO: ModelInfo = <M as LumpedModel>::INFO;
+
+    fn build(values: &Values) -> Result<Self> {
+        <M as LumpedModel>::build(values)
     }
-    let motion = lumped.simulate(drive, start, accuracy, stop)?;
-    Ok(motion.map(|motion| {
-        let end = &motion.last;
-        let state = [vec![end.x, end.v], stage.state(&end.memory)].concat();
-        Response::of(motion, Values::scalars(M::INFO.state, &state), true)
-    }))
+
+    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
+        let Instant { x, v, memory } = self.lumped().equilibrium(voltages);
+        let state = [vec![x, v], self.state(&memory)].concat();
+        finite_state(Values::scalars(<M as LumpedModel>::INFO.state, &state), voltages)
+    }
+
+    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
+        let Experiment { drive, initial, method, accuracy, stop } = *experiment;
+        method.exponential_only()?;
+        let lumped = self.lumped();
+        let mut start = lumped.rest();
+        if let Some(initial) = initial {
+            let state: Vec<f64> = initial.iter().filter_map(|(_, n)| n.first().copied()).collect();
+            let [x, v] = leading(&state);
+            start = Instant { x, v, memory: self.memory(&state) };
+        }
+        let motion = lumped.simulate(drive, start, accuracy, stop)?;
+        Ok(motion.map(|motion| {
+            let end = &motion.last;
+            let state = [vec![end.x, end.v], self.state(&end.memory)].concat();
+            Response::of(motion, Values::scalars(<M as LumpedModel>::INFO.state, &state), true)
+        }))
+    }
+
+    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
+        LumpedModel::loop_plants(self, low, high)
+    }
+}
+
+impl<M: LumpedModel> Invertible for M {
+    type Inverse = <M as LumpedModel>::Inverse;
+
+    fn inverse(
+        &self,
+        dt: f64,
+        initial: Option<&Values>,
+    ) -> Result<(Self::Inverse, <Self::Inverse as Inverse>::State)> {
+        from_rest_only(initial)?;
+        let inverse = LumpedModel::inverse(self, dt)?;
+        let start = inverse.rest();
+        Ok((inverse, start))
+    }
 }

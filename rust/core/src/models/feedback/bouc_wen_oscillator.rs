@@ -10,7 +10,7 @@
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Operator};
-use piezotrack_control::inverse::{FeedbackInverseState, OscillatorInverse};
+use piezotrack_control::inverse::OscillatorInverse;
 
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Result, finite, not_zero, within};
@@ -21,10 +21,7 @@ use crate::models::parameters::mechanics_parameters::{V, X};
 use crate::models::parameters::search_ranges::{Measures, Ranges};
 use crate::models::parameters::values::{Held, ParameterInfo, Values};
 use crate::models::plant::KernelModel;
-use crate::models::traits::{
-    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, kernel_equilibrium, leading, simulate_kernel,
-};
+use crate::models::traits::{KernelVisitor, LumpedModel, ModelInfo, Searchable, leading};
 
 /// The unit of gamma and delta is that for nu = 1 and a beta without one; in general it is
 /// 1/(m N^(nu-1)).
@@ -147,7 +144,7 @@ impl KernelModel for BoucWenOscillator {
     }
 }
 
-impl StageModel for BoucWenOscillator {
+impl LumpedModel for BoucWenOscillator {
     const INFO: ModelInfo = ModelInfo {
         name: "bouc-wen-oscillator",
         title: "Bouc-Wen oscillator",
@@ -157,16 +154,10 @@ impl StageModel for BoucWenOscillator {
         published: &[("benchmark", || Values::scalars(PARAMETERS, &Self::benchmark().values()))],
     };
 
+    type Inverse = OscillatorInverse;
+
     fn build(values: &Values) -> Result<Self> {
         Self::new(&values.numbers())
-    }
-
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        kernel_equilibrium(self, voltages)
-    }
-
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        simulate_kernel(self, experiment)
     }
 
     /// On its settled loop between the displacements that the two forces lead to without
@@ -180,6 +171,13 @@ impl StageModel for BoucWenOscillator {
             let mechanics = Mechanics { mass, damping, stiffness: 1.0 / gain };
             LoopPlant::mechanical(&mechanics, 1.0)
         })
+    }
+
+    fn inverse(&self, dt: f64) -> Result<OscillatorInverse> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let Self { alpha, beta, gamma, delta, exponent, .. } = *self;
+        let hysteresis = (alpha, beta * gamma, beta * delta, exponent);
+        Ok(OscillatorInverse::new(mass, damping, stiffness, hysteresis, dt)?)
     }
 }
 
@@ -207,23 +205,6 @@ impl Searchable for BoucWenOscillator {
 
     fn kernel<V: KernelVisitor>(held: &Held, _order: Order, visitor: V) -> V::Output {
         visitor.visit(BoucWenOscillatorKernel { exponent: held.value("exponent").unwrap_or(1.0) })
-    }
-}
-
-impl Invertible for BoucWenOscillator {
-    type Inverse = OscillatorInverse;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(OscillatorInverse, FeedbackInverseState)> {
-        from_rest_only(initial)?;
-        let Mechanics { mass, damping, stiffness } = self.mechanics;
-        let Self { alpha, beta, gamma, delta, exponent, .. } = *self;
-        let hysteresis = (alpha, beta * gamma, beta * delta, exponent);
-        let inverse = OscillatorInverse::new(mass, damping, stiffness, hysteresis, dt)?;
-        Ok((inverse, inverse.rest()))
     }
 }
 

@@ -11,7 +11,7 @@
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWenState, FirstOrderDahl, Operator};
-use piezotrack_control::inverse::{FeedbackInverseState, FirstOrderDahlInverse};
+use piezotrack_control::inverse::FirstOrderDahlInverse;
 
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Result, not_negative, not_zero, positive, within};
@@ -24,10 +24,7 @@ use crate::models::parameters::mechanics_parameters::{
 use crate::models::parameters::search_ranges::{Measures, Ranges};
 use crate::models::parameters::values::{Held, ParameterInfo, Values};
 use crate::models::plant::KernelModel;
-use crate::models::traits::{
-    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, kernel_equilibrium, leading, simulate_kernel,
-};
+use crate::models::traits::{KernelVisitor, LumpedModel, ModelInfo, Searchable, leading};
 
 const PARAMETERS: &[ParameterInfo] = &[
     MASS,
@@ -122,7 +119,7 @@ impl KernelModel for FirstOrderDahlStage {
     }
 }
 
-impl StageModel for FirstOrderDahlStage {
+impl LumpedModel for FirstOrderDahlStage {
     const INFO: ModelInfo = ModelInfo {
         name: "first-order-dahl",
         title: "Dahl, first order",
@@ -132,20 +129,21 @@ impl StageModel for FirstOrderDahlStage {
         published: &[],
     };
 
+    type Inverse = FirstOrderDahlInverse;
+
     fn build(values: &Values) -> Result<Self> {
         Self::new(&values.numbers())
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        kernel_equilibrium(self, voltages)
-    }
-
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        simulate_kernel(self, experiment)
-    }
-
     fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
         plants_with_friction(&self.operator(), &self.mechanics, self.piezo_coefficient, low, high)
+    }
+
+    fn inverse(&self, dt: f64) -> Result<FirstOrderDahlInverse> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let hysteresis = (self.rest_stiffness, self.coulomb_force, self.exponent);
+        let piezo = self.piezo_coefficient;
+        Ok(FirstOrderDahlInverse::new(mass, damping, stiffness, piezo, hysteresis, dt)?)
     }
 }
 
@@ -190,23 +188,6 @@ impl Searchable for FirstOrderDahlStage {
 
     fn kernel<V: KernelVisitor>(held: &Held, _order: Order, visitor: V) -> V::Output {
         visitor.visit(FirstOrderDahlKernel { exponent: held.value("exponent").unwrap_or(1.0) })
-    }
-}
-
-impl Invertible for FirstOrderDahlStage {
-    type Inverse = FirstOrderDahlInverse;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(FirstOrderDahlInverse, FeedbackInverseState)> {
-        from_rest_only(initial)?;
-        let Mechanics { mass, damping, stiffness } = self.mechanics;
-        let hysteresis = (self.rest_stiffness, self.coulomb_force, self.exponent);
-        let piezo = self.piezo_coefficient;
-        let inverse = FirstOrderDahlInverse::new(mass, damping, stiffness, piezo, hysteresis, dt)?;
-        Ok((inverse, inverse.rest()))
     }
 }
 

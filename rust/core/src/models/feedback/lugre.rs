@@ -12,7 +12,7 @@
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWenState, FirstOrderDahl, LuGre, Operator};
-use piezotrack_control::inverse::{LuGreInverse, LuGreInverseState};
+use piezotrack_control::inverse::LuGreInverse;
 
 use super::first_order_dahl::plants_with_friction;
 use crate::design::LoopPlant;
@@ -27,10 +27,7 @@ use crate::models::parameters::mechanics_parameters::{
 use crate::models::parameters::search_ranges::{Measures, Ranges};
 use crate::models::parameters::values::{Held, ParameterInfo, Values};
 use crate::models::plant::KernelModel;
-use crate::models::traits::{
-    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, kernel_equilibrium, leading, simulate_kernel,
-};
+use crate::models::traits::{KernelVisitor, LumpedModel, ModelInfo, Searchable, leading};
 
 const PARAMETERS: &[ParameterInfo] = &[
     MASS,
@@ -151,7 +148,7 @@ impl KernelModel for LuGreStage {
     }
 }
 
-impl StageModel for LuGreStage {
+impl LumpedModel for LuGreStage {
     const INFO: ModelInfo = ModelInfo {
         name: "lugre",
         title: "LuGre",
@@ -161,16 +158,10 @@ impl StageModel for LuGreStage {
         published: &[],
     };
 
+    type Inverse = LuGreInverse;
+
     fn build(values: &Values) -> Result<Self> {
         Self::new(&values.numbers())
-    }
-
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        kernel_equilibrium(self, voltages)
-    }
-
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        simulate_kernel(self, experiment)
     }
 
     /// On a slow settled loop, without the damping of the bristles, which is gone where they slide.
@@ -178,6 +169,12 @@ impl StageModel for LuGreStage {
         let Mechanics { damping, .. } = self.mechanics;
         let mechanics = Mechanics { damping: damping + self.viscous_friction, ..self.mechanics };
         plants_with_friction(&slow(&self.friction), &mechanics, self.piezo_coefficient, low, high)
+    }
+
+    fn inverse(&self, dt: f64) -> Result<LuGreInverse> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let mechanics = [mass, damping + self.viscous_friction, stiffness];
+        Ok(LuGreInverse::new(mechanics, self.piezo_coefficient, &self.friction, dt)?)
     }
 }
 
@@ -206,22 +203,6 @@ impl Searchable for LuGreStage {
 
     fn kernel<V: KernelVisitor>(_held: &Held, _order: Order, visitor: V) -> V::Output {
         visitor.visit(LuGreKernel)
-    }
-}
-
-impl Invertible for LuGreStage {
-    type Inverse = LuGreInverse;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(LuGreInverse, LuGreInverseState)> {
-        from_rest_only(initial)?;
-        let Mechanics { mass, damping, stiffness } = self.mechanics;
-        let mechanics = [mass, damping + self.viscous_friction, stiffness];
-        let inverse = LuGreInverse::new(mechanics, self.piezo_coefficient, &self.friction, dt)?;
-        Ok((inverse, inverse.rest()))
     }
 }
 

@@ -13,8 +13,7 @@ use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{
     FRICTION_ELEMENTS, Operator, ParallelDahl, ParallelDahlState,
 };
-use piezotrack_control::inverse::{FeedbackInverseState, ParallelDahlInverse};
-use piezotrack_control::unfused::Unfused;
+use piezotrack_control::inverse::ParallelDahlInverse;
 
 use super::first_order_dahl::plants_with_friction;
 use crate::design::LoopPlant;
@@ -28,10 +27,7 @@ use crate::models::parameters::mechanics_parameters::{
 use crate::models::parameters::search_ranges::{Measures, Ranges};
 use crate::models::parameters::values::{Held, ParameterInfo, Values};
 use crate::models::plant::KernelModel;
-use crate::models::traits::{
-    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, kernel_equilibrium, leading, simulate_kernel,
-};
+use crate::models::traits::{KernelVisitor, LumpedModel, ModelInfo, Searchable, leading};
 
 const PARAMETERS: &[ParameterInfo] = &[
     MASS,
@@ -144,7 +140,7 @@ impl KernelModel for ParallelDahlStage {
     }
 }
 
-impl StageModel for ParallelDahlStage {
+impl LumpedModel for ParallelDahlStage {
     const INFO: ModelInfo = ModelInfo {
         name: "parallel-dahl",
         title: "Dahl elements in parallel",
@@ -154,20 +150,21 @@ impl StageModel for ParallelDahlStage {
         published: &[],
     };
 
+    type Inverse = ParallelDahlInverse;
+
     fn build(values: &Values) -> Result<Self> {
         Self::new(&values.numbers())
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        kernel_equilibrium(self, voltages)
-    }
-
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        simulate_kernel(self, experiment)
-    }
-
     fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
         plants_with_friction(&self.operator(), &self.mechanics, self.piezo_coefficient, low, high)
+    }
+
+    fn inverse(&self, dt: f64) -> Result<ParallelDahlInverse> {
+        let Mechanics { mass, damping, stiffness } = self.mechanics;
+        let hysteresis = (self.rest_stiffnesses, self.yield_path, self.path_ratio);
+        let piezo = self.piezo_coefficient;
+        Ok(ParallelDahlInverse::new(mass, damping, stiffness, piezo, hysteresis, dt)?)
     }
 }
 
@@ -195,23 +192,6 @@ impl Searchable for ParallelDahlStage {
 
     fn kernel<V: KernelVisitor>(_held: &Held, _order: Order, visitor: V) -> V::Output {
         visitor.visit(ParallelDahlKernel)
-    }
-}
-
-impl Invertible for ParallelDahlStage {
-    type Inverse = ParallelDahlInverse;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(ParallelDahlInverse, FeedbackInverseState<ParallelDahlState<Unfused>>)> {
-        from_rest_only(initial)?;
-        let Mechanics { mass, damping, stiffness } = self.mechanics;
-        let hysteresis = (self.rest_stiffnesses, self.yield_path, self.path_ratio);
-        let piezo = self.piezo_coefficient;
-        let inverse = ParallelDahlInverse::new(mass, damping, stiffness, piezo, hysteresis, dt)?;
-        Ok((inverse, inverse.rest()))
     }
 }
 

@@ -14,7 +14,7 @@
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{AsymmetricBoucWen, BoucWenState};
-use piezotrack_control::inverse::{AsymmetricBoucWenInverse, BoucWenInverseState};
+use piezotrack_control::inverse::AsymmetricBoucWenInverse;
 
 use super::bouc_wen::{self as symmetric, BoucWenStage};
 use super::input_kernel::{InputHysteresis, InputKernel, plants_with_input};
@@ -24,10 +24,7 @@ use crate::integrator::{InputMemory, LumpedStage, Order, Parameters};
 use crate::models::parameters::search_ranges::{Measures, Ranges};
 use crate::models::parameters::values::{Held, ParameterInfo, Values};
 use crate::models::plant::KernelModel;
-use crate::models::traits::{
-    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, kernel_equilibrium, leading, simulate_kernel,
-};
+use crate::models::traits::{KernelVisitor, LumpedModel, ModelInfo, Searchable, leading};
 
 const PARAMETERS: &[ParameterInfo] = &[
     symmetric::PARAMETERS[0],
@@ -103,7 +100,7 @@ impl KernelModel for AsymmetricBoucWenStage {
     }
 }
 
-impl StageModel for AsymmetricBoucWenStage {
+impl LumpedModel for AsymmetricBoucWenStage {
     const INFO: ModelInfo = ModelInfo {
         name: "asymmetric-bouc-wen",
         title: "asymmetric Bouc-Wen",
@@ -113,21 +110,21 @@ impl StageModel for AsymmetricBoucWenStage {
         published: &[],
     };
 
+    type Inverse = AsymmetricBoucWenInverse;
+
     fn build(values: &Values) -> Result<Self> {
         Self::new(&values.numbers())
-    }
-
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        kernel_equilibrium(self, voltages)
-    }
-
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        simulate_kernel(self, experiment)
     }
 
     fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
         let BoucWenStage { mechanics, piezo_coefficient, .. } = &self.symmetric;
         plants_with_input(&self.operator(), mechanics, *piezo_coefficient, low, high)
+    }
+
+    fn inverse(&self, dt: f64) -> Result<AsymmetricBoucWenInverse> {
+        positive("dt", dt, "s")?;
+        let [m, b, k, d, alpha, rates @ ..] = self.values();
+        Ok(AsymmetricBoucWenInverse::asymmetric([m, b, k, d], alpha, rates)?)
     }
 }
 
@@ -148,22 +145,6 @@ impl Searchable for AsymmetricBoucWenStage {
 
 /// Largest asymmetry that is searched, over the range of the drive.
 const MOST_ASYMMETRY: f64 = 3.0;
-
-impl Invertible for AsymmetricBoucWenStage {
-    type Inverse = AsymmetricBoucWenInverse;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(AsymmetricBoucWenInverse, BoucWenInverseState)> {
-        from_rest_only(initial)?;
-        positive("dt", dt, "s")?;
-        let [m, b, k, d, alpha, rates @ ..] = self.values();
-        let inverse = AsymmetricBoucWenInverse::asymmetric([m, b, k, d], alpha, rates)?;
-        Ok((inverse, inverse.rest()))
-    }
-}
 
 /// The hysteresis of asymmetric Bouc-Wen stages.
 #[derive(Clone, Copy, Debug)]

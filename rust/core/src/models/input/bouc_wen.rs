@@ -9,7 +9,7 @@
 
 use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Operator};
-use piezotrack_control::inverse::{BoucWenInverse, BoucWenInverseState};
+use piezotrack_control::inverse::BoucWenInverse;
 
 use super::input_kernel::{InputHysteresis, InputKernel, plants_with_input};
 use crate::design::LoopPlant;
@@ -19,10 +19,7 @@ use crate::models::parameters::mechanics_parameters::{V, X};
 use crate::models::parameters::search_ranges::{Measures, Ranges};
 use crate::models::parameters::values::{Held, ParameterInfo, Values};
 use crate::models::plant::KernelModel;
-use crate::models::traits::{
-    Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
-    from_rest_only, kernel_equilibrium, leading, simulate_kernel,
-};
+use crate::models::traits::{KernelVisitor, LumpedModel, ModelInfo, Searchable, leading};
 
 /// The unit of beta and gamma is that for n = 1; in general it is 1/(V m^(n-1)).
 pub(in crate::models) const PARAMETERS: &[ParameterInfo; 8] = &[
@@ -154,7 +151,7 @@ impl KernelModel for BoucWenStage {
     }
 }
 
-impl StageModel for BoucWenStage {
+impl LumpedModel for BoucWenStage {
     const INFO: ModelInfo = ModelInfo {
         name: "bouc-wen",
         title: "Bouc-Wen",
@@ -169,20 +166,20 @@ impl StageModel for BoucWenStage {
         ],
     };
 
+    type Inverse = BoucWenInverse;
+
     fn build(values: &Values) -> Result<Self> {
         Self::new(&values.numbers())
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        kernel_equilibrium(self, voltages)
-    }
-
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        simulate_kernel(self, experiment)
-    }
-
     fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
         plants_with_input(&self.operator(), &self.mechanics, self.piezo_coefficient, low, high)
+    }
+
+    fn inverse(&self, dt: f64) -> Result<BoucWenInverse> {
+        positive("dt", dt, "s")?;
+        let [m, b, k, d, alpha, beta, gamma, n] = self.values();
+        Ok(BoucWenInverse::new(m, b, k, d, alpha, beta, gamma, n)?)
     }
 }
 
@@ -207,22 +204,6 @@ impl Searchable for BoucWenStage {
     fn kernel<V: KernelVisitor>(held: &Held, _order: Order, visitor: V) -> V::Output {
         let exponent = held.value("exponent").unwrap_or(1.0);
         visitor.visit(InputKernel(BoucWenHysteresis { exponent }))
-    }
-}
-
-impl Invertible for BoucWenStage {
-    type Inverse = BoucWenInverse;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(BoucWenInverse, BoucWenInverseState)> {
-        from_rest_only(initial)?;
-        positive("dt", dt, "s")?;
-        let [m, b, k, d, alpha, beta, gamma, n] = self.values();
-        let inverse = BoucWenInverse::new(m, b, k, d, alpha, beta, gamma, n)?;
-        Ok((inverse, inverse.rest()))
     }
 }
 

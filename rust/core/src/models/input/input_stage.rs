@@ -14,16 +14,14 @@
 
 use core::fmt::Debug;
 
-use piezotrack_control::{CreepState, InputInverse, InputInverseState, OperatorInverse};
-
 use super::superposition::Rest;
 use crate::error::{Error, Result, positive};
 use crate::integrator::columns;
-use crate::models::creep::{MOST_RELAXATIONS, Relaxation, RelaxationFlow, RelaxationState};
+use crate::models::creep::{Relaxation, RelaxationFlow, RelaxationState};
 use crate::models::parameters::mechanics_parameters::{V, X};
 use crate::models::parameters::values::{ParameterInfo, Values};
 use crate::models::plant::{Plant, Settling};
-use crate::models::traits::{Experiment, Response, finite_state};
+use crate::models::traits::{Experiment, Response};
 use crate::signal::Hold;
 
 /// Parts of a sampling interval at most; the last one takes the rest.
@@ -240,7 +238,7 @@ impl<O: Remembering> InputStage<O> {
     }
 
     /// The values of a state.
-    fn values_of(&self, state: &InputStageState<O::State>) -> Values {
+    pub(super) fn values_of(&self, state: &InputStageState<O::State>) -> Values {
         let InputStageState { operator, relaxation } = *state;
         let creep = relaxation.creep[..self.relaxation.count].to_vec();
         let memory = self.operator.memory(&operator);
@@ -250,11 +248,6 @@ impl<O: Remembering> InputStage<O> {
         let entries =
             [vec![x], vec![v], vec![input], memory, creep, places.to_vec(), speeds.to_vec()];
         Values::of(O::STATE, entries)
-    }
-
-    /// Equilibrium after a slow visit to each voltage in turn, from rest, its creep complete.
-    pub(in crate::models) fn equilibrium_values(&self, voltages: &[f64]) -> Result<Values> {
-        finite_state(self.values_of(&self.settled_at(voltages)), voltages)
     }
 
     /// The operator's output at rest, m.
@@ -268,20 +261,6 @@ impl<O: Remembering> InputStage<O> {
     fn jump(&self, state: &mut InputStageState<O::State>, volts: f64, zero: f64) {
         let output = self.operator.follow(&mut state.operator, volts) - zero;
         self.relaxation.jump(&mut state.relaxation, output);
-    }
-
-    /// The inverse of the stage for references sampled every `dt` seconds, from the inverse of
-    /// its operator.
-    ///
-    /// # Errors
-    /// Names `dt` where it is not above 0.
-    pub fn feedforward<I: OperatorInverse>(
-        &self,
-        operator: I,
-        dt: f64,
-    ) -> Result<InputInverse<I, MOST_RELAXATIONS>> {
-        let Relaxation { dynamics, .. } = self.relaxation;
-        Ok(InputInverse::with(operator, self.zero(), self.relaxation.used(), dynamics, dt)?)
     }
 }
 
@@ -357,10 +336,7 @@ impl<O: Segmented> InputStage<O> {
     ///
     /// The drive jumps from where the initial state has it to its first sample. With a zero-order
     /// hold a sample shows the stage before the drive's step at that instant has any effect.
-    pub(in crate::models) fn follow(
-        &self,
-        experiment: &Experiment<'_>,
-    ) -> Result<Option<Response>> {
+    pub(super) fn follow(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
         let Experiment { drive, initial, method, accuracy, stop } = *experiment;
         method.exponential_only()?;
         let flow = self.steps(drive.dt, positive("accuracy", accuracy, "m")?);
@@ -409,15 +385,6 @@ impl<O: Segmented> InputStage<O> {
             unique: true,
         }))
     }
-}
-
-/// State of an inverse that continues from a state of its stage.
-pub(in crate::models) fn inverse_state<I: OperatorInverse>(
-    inverse: &InputInverse<I, MOST_RELAXATIONS>,
-    operator: I::State,
-    relaxation: &RelaxationState,
-) -> InputInverseState<I::State, MOST_RELAXATIONS> {
-    inverse.start(operator, CreepState { input: relaxation.input, reached: relaxation.creep })
 }
 
 impl<O: Segmented> Plant for InputStage<O> {

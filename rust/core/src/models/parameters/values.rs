@@ -77,6 +77,23 @@ impl ParameterInfo {
     }
 }
 
+/// Room for the parameters of any stage, or its state.
+pub(in crate::models) const ROOM: usize = 20;
+
+/// Descriptions with others after them.
+pub(in crate::models) const fn extended(
+    own: &[ParameterInfo],
+    more: &[ParameterInfo],
+) -> [ParameterInfo; ROOM] {
+    let mut all = [ParameterInfo::new("", "", ""); ROOM];
+    let mut i = 0;
+    while i < own.len() + more.len() {
+        all[i] = if i < own.len() { own[i] } else { more[i - own.len()] };
+        i += 1;
+    }
+    all
+}
+
 /// Values of named parameters, or of a state, in the order of their descriptions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Values {

@@ -13,25 +13,24 @@
 //! Least squares find the shares of the three families, and with them the side on which loops are
 //! wider.
 
-use piezotrack_control::hysteresis::{AsymmetricPlay, AsymmetricPlayState, Bend, PlayFamily};
+use piezotrack_control::hysteresis::{
+    AsymmetricPlay, AsymmetricPlayState, Bend, Operator, PlayFamily,
+};
 use piezotrack_control::{AsymmetricPlayInverse, AsymmetricPlayInverseState};
-use piezotrack_control::{InputInverse, InputInverseState};
 
 use super::cubic_curve::checked_range;
 use super::prandtl_ishlinskii::{MOST_PLAYS, along, checked_thresholds, direction};
-use crate::design::{Gains, LoopPlant};
 use crate::error::Result;
-use crate::models::creep::{MOST_RELAXATIONS, Relaxation};
+use crate::models::input::input_model::InputModel;
 use crate::models::input::input_stage::{
-    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, inverse_state, recall_plays,
-    state_at_rest,
+    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, recall_plays, state_at_rest,
 };
 use crate::models::input::superposition::{
     FittedWeights, Places, Rest, Signals, SignalsOf, Superposition,
 };
-use crate::models::parameters::dynamics_parameters::{DYNAMICS, same_length};
+use crate::models::parameters::dynamics_parameters::same_length;
 use crate::models::parameters::values::{ParameterInfo, Values};
-use crate::models::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use crate::models::traits::StageModel;
 use crate::signal::index;
 
 /// The operator of a stage, V to m.
@@ -47,14 +46,6 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::list("concave_weights", "v", "m/V").or_none(),
     ParameterInfo::list("convex_thresholds", "t", "V").or_none(),
     ParameterInfo::list("convex_weights", "c", "m/V").or_none(),
-    DYNAMICS[0],
-    DYNAMICS[1],
-    DYNAMICS[2],
-    DYNAMICS[3],
-    DYNAMICS[4],
-    DYNAMICS[5],
-    DYNAMICS[6],
-    DYNAMICS[7],
 ];
 
 /// Names of thresholds and weights of each family.
@@ -176,51 +167,34 @@ impl Segmented for AsymmetricPlays {
     }
 }
 
-impl StageModel for AsymmetricPrandtlIshlinskiiStage {
-    const INFO: ModelInfo = ModelInfo {
-        name: "asymmetric-prandtl-ishlinskii",
-        title: "asymmetric Prandtl-Ishlinskii",
-        drive_unit: "V",
-        parameters: PARAMETERS,
-        state: PLAYS_STATE,
-        published: &[],
-    };
+impl InputModel for AsymmetricPlays {
+    const NAME: &'static str = "asymmetric-prandtl-ishlinskii";
+    const TITLE: &'static str = "asymmetric Prandtl-Ishlinskii";
+    const PARAMETERS: &'static [ParameterInfo] = PARAMETERS;
+
+    type Inverse = AsymmetricPlayInverse<MOST_PLAYS>;
 
     fn build(values: &Values) -> Result<Self> {
         let number = |name| values.number(name);
         let families = FAMILIES.map(|(places, shares)| (values.list(places), values.list(shares)));
         let range = (number("low"), number("high"));
-        let operator = asymmetric_plays(number("linear"), range, families)?;
-        Ok(Self { operator, relaxation: Relaxation::build(values)? })
+        asymmetric_plays(number("linear"), range, families)
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        self.equilibrium_values(voltages)
+    fn path(&self) -> &impl Operator<f64> {
+        self
     }
 
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        self.follow(experiment)
+    fn inverse(&self, _dt: f64) -> Result<Self::Inverse> {
+        Ok(AsymmetricPlayInverse(*self))
     }
 
-    /// On its settled loop between the two voltages.
-    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
-        let gains = Gains::of(&self.operator, low, high, |slope| slope)?;
-        gains.plants(|gain| self.relaxation.loop_plant(gain))
-    }
-}
-
-/// State of the inverse of a stage.
-type InverseState = InputInverseState<AsymmetricPlayInverseState<MOST_PLAYS>, MOST_RELAXATIONS>;
-
-impl Invertible for AsymmetricPrandtlIshlinskiiStage {
-    type Inverse = InputInverse<AsymmetricPlayInverse<MOST_PLAYS>, MOST_RELAXATIONS>;
-
-    fn inverse(&self, dt: f64, initial: Option<&Values>) -> Result<(Self::Inverse, InverseState)> {
-        let inverse = self.feedforward(AsymmetricPlayInverse(self.operator), dt)?;
-        let state = self.state(initial)?;
-        let memory = inverse.operator().memory(&state.operator);
-        let start = inverse_state(&inverse, memory, &state.relaxation);
-        Ok((inverse, start))
+    fn start(
+        &self,
+        inverse: &Self::Inverse,
+        state: &Self::State,
+    ) -> AsymmetricPlayInverseState<MOST_PLAYS> {
+        inverse.memory(state)
     }
 }
 
@@ -320,7 +294,7 @@ impl Superposition for AsymmetricPrandtlIshlinskiiStage {
         };
         let numbers = [of.linear, of.drive.0, of.drive.1].map(|number| vec![number]);
         let operator = numbers.into_iter().chain((0..Bend::ALL.len()).flat_map(family));
-        Values::of(PARAMETERS, operator.chain(of.relaxation.values()))
+        Values::of(Self::INFO.parameters, operator.chain(of.relaxation.values()))
     }
 
     fn state_at_rest(rest: &Rest<'_>) -> Values {

@@ -28,24 +28,21 @@
 //!
 //! Operator and inverse use arrays and `libm` only, and could move to the firmware's crate.
 
+use piezotrack_control::OperatorInverse;
 use piezotrack_control::hysteresis::{Operator, PlayState};
-use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse};
 
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
 use super::tanh_envelope::{MOST_BEND, TanhEnvelope};
-use crate::design::{Gains, LoopPlant};
 use crate::error::Result;
-use crate::models::creep::{MOST_RELAXATIONS, Relaxation};
+use crate::models::input::input_model::InputModel;
 use crate::models::input::input_stage::{
-    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, inverse_state, recall_plays,
-    state_at_rest,
+    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, recall_plays, state_at_rest,
 };
 use crate::models::input::superposition::{
     Edges, FittedWeights, Places, PlaySignals, Rest, Shape, Signals, SignalsOf, Superposition,
 };
-use crate::models::parameters::dynamics_parameters::DYNAMICS;
 use crate::models::parameters::values::{ParameterInfo, Values};
-use crate::models::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use crate::models::traits::StageModel;
 
 /// Room for the play of threshold 0 and the others.
 const SLOTS: usize = MOST_PLAYS + 1;
@@ -68,14 +65,6 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::optional("falling_slope", "c1'", "1/V"),
     ParameterInfo::optional("falling_shift", "c2'", ""),
     ParameterInfo::optional("falling_level", "c3'", "V"),
-    DYNAMICS[0],
-    DYNAMICS[1],
-    DYNAMICS[2],
-    DYNAMICS[3],
-    DYNAMICS[4],
-    DYNAMICS[5],
-    DYNAMICS[6],
-    DYNAMICS[7],
 ];
 
 /// The operator: plays between two envelopes, V to m.
@@ -385,15 +374,12 @@ impl OperatorInverse for GeneralisedPlaysInverse {
     }
 }
 
-impl StageModel for GeneralisedPrandtlIshlinskiiStage {
-    const INFO: ModelInfo = ModelInfo {
-        name: "generalised-prandtl-ishlinskii",
-        title: "generalised Prandtl-Ishlinskii",
-        drive_unit: "V",
-        parameters: PARAMETERS,
-        state: PLAYS_STATE,
-        published: &[],
-    };
+impl InputModel for GeneralisedPlays {
+    const NAME: &'static str = "generalised-prandtl-ishlinskii";
+    const TITLE: &'static str = "generalised Prandtl-Ishlinskii";
+    const PARAMETERS: &'static [ParameterInfo] = PARAMETERS;
+
+    type Inverse = GeneralisedPlaysInverse;
 
     fn build(values: &Values) -> Result<Self> {
         let [scale, slope, shift, level] =
@@ -409,39 +395,19 @@ impl StageModel for GeneralisedPrandtlIshlinskiiStage {
         };
         let linear = values.number("linear");
         let (thresholds, weights) = (values.list("thresholds"), values.list("weights"));
-        let operator = GeneralisedPlays::new(linear, thresholds, weights, rising, falling)?;
-        Ok(Self { operator, relaxation: Relaxation::build(values)? })
+        GeneralisedPlays::new(linear, thresholds, weights, rising, falling)
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        self.equilibrium_values(voltages)
+    fn path(&self) -> &impl Operator<f64> {
+        self
     }
 
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        self.follow(experiment)
+    fn inverse(&self, _dt: f64) -> Result<Self::Inverse> {
+        Ok(GeneralisedPlaysInverse(*self))
     }
 
-    /// On its settled loop between the two voltages.
-    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
-        let gains = Gains::of(&self.operator, low, high, |slope| slope)?;
-        gains.plants(|gain| self.relaxation.loop_plant(gain))
-    }
-}
-
-impl Invertible for GeneralisedPrandtlIshlinskiiStage {
-    type Inverse = InputInverse<GeneralisedPlaysInverse, MOST_RELAXATIONS>;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(Self::Inverse, InputInverseState<GeneralisedPlaysInverseState, MOST_RELAXATIONS>)>
-    {
-        let inverse = self.feedforward(GeneralisedPlaysInverse(self.operator), dt)?;
-        let state = self.state(initial)?;
-        let memory = inverse.operator().memory(&state.operator);
-        let start = inverse_state(&inverse, memory, &state.relaxation);
-        Ok((inverse, start))
+    fn start(&self, inverse: &Self::Inverse, state: &Self::State) -> GeneralisedPlaysInverseState {
+        inverse.memory(state)
     }
 }
 
@@ -485,7 +451,7 @@ impl Superposition for GeneralisedPrandtlIshlinskiiStage {
             vec![],
             vec![],
         ];
-        Values::of(PARAMETERS, operator.into_iter().chain(relaxation))
+        Values::of(Self::INFO.parameters, operator.into_iter().chain(relaxation))
     }
 
     /// With the play of the drive.

@@ -21,37 +21,25 @@
 //! identified like it; its parameters are those of the elements. Drive and displacement determine
 //! forces over k only.
 
-use piezotrack_control::Inverse;
-use piezotrack_control::hysteresis::PlayState;
+use piezotrack_control::hysteresis::{Operator, PlayState};
 
 use super::prandtl_ishlinskii::{
     MOST_PLAYS, PlayHysteresis, PrandtlIshlinskiiStage, checked_thresholds,
 };
-use crate::design::LoopPlant;
 use crate::error::{Result, not_negative, not_zero};
-use crate::models::creep::Relaxation;
-use crate::models::input::input_stage::{
-    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented,
-};
+use crate::models::input::input_model::InputModel;
+use crate::models::input::input_stage::{InputOperator, InputStage, Remembering, Segmented};
 use crate::models::input::superposition::{
     FittedWeights, Places, Rest, Signals, SignalsOf, Superposition,
 };
-use crate::models::parameters::dynamics_parameters::{DYNAMICS, same_length};
+use crate::models::parameters::dynamics_parameters::same_length;
 use crate::models::parameters::values::{ParameterInfo, Values};
-use crate::models::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use crate::models::traits::StageModel;
 
 const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::new("piezo_coefficient", "T/k", "m/V"),
     ParameterInfo::list("stiffness_ratios", "k_i/k", ""),
     ParameterInfo::list("slip_displacements", "f_i/k_i", "m"),
-    DYNAMICS[0],
-    DYNAMICS[1],
-    DYNAMICS[2],
-    DYNAMICS[3],
-    DYNAMICS[4],
-    DYNAMICS[5],
-    DYNAMICS[6],
-    DYNAMICS[7],
 ];
 
 /// Elasto-slide elements in parallel with a spring, as the plays that they are equivalent to.
@@ -177,35 +165,31 @@ impl Segmented for MaxwellSlip {
     }
 }
 
-impl StageModel for MaxwellSlipStage {
-    const INFO: ModelInfo = ModelInfo {
-        name: "maxwell-slip",
-        title: "Maxwell slip",
-        drive_unit: "V",
-        parameters: PARAMETERS,
-        state: PLAYS_STATE,
-        published: &[],
-    };
+impl InputModel for MaxwellSlip {
+    const NAME: &'static str = "maxwell-slip";
+    const TITLE: &'static str = "Maxwell slip";
+    const PARAMETERS: &'static [ParameterInfo] = PARAMETERS;
+
+    type Inverse = <PlayHysteresis as InputModel>::Inverse;
 
     fn build(values: &Values) -> Result<Self> {
-        let operator = MaxwellSlip::new(
+        MaxwellSlip::new(
             values.number("piezo_coefficient"),
             values.list("stiffness_ratios"),
             values.list("slip_displacements"),
-        )?;
-        Ok(Self { operator, relaxation: Relaxation::build(values)? })
+        )
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        self.as_plays().equilibrium(voltages)
+    fn path(&self) -> &impl Operator<f64> {
+        &self.plays.plays
     }
 
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        self.as_plays().simulate(experiment)
+    fn inverse(&self, dt: f64) -> Result<Self::Inverse> {
+        self.plays.inverse(dt)
     }
 
-    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
-        self.as_plays().loop_plants(low, high)
+    fn start(&self, inverse: &Self::Inverse, state: &Self::State) -> PlayState<f64, MOST_PLAYS> {
+        self.plays.start(inverse, state)
     }
 }
 
@@ -214,19 +198,6 @@ impl MaxwellSlipStage {
     #[must_use]
     pub fn as_plays(&self) -> PrandtlIshlinskiiStage {
         InputStage { operator: self.operator.plays, relaxation: self.relaxation }
-    }
-}
-
-/// The inverse of the plays is the weighted sum of stops.
-impl Invertible for MaxwellSlipStage {
-    type Inverse = <PrandtlIshlinskiiStage as Invertible>::Inverse;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(Self::Inverse, <Self::Inverse as Inverse>::State)> {
-        self.as_plays().inverse(dt, initial)
     }
 }
 
@@ -240,7 +211,7 @@ impl Superposition for MaxwellSlipStage {
 
     fn values(fitted: &FittedWeights) -> Values {
         let operator = elements(fitted.linear, &fitted.places, &fitted.weights);
-        Values::of(PARAMETERS, operator.into_iter().chain(fitted.relaxation.values()))
+        Values::of(Self::INFO.parameters, operator.into_iter().chain(fitted.relaxation.values()))
     }
 
     fn state_at_rest(rest: &Rest<'_>) -> Values {

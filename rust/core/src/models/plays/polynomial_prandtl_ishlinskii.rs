@@ -15,25 +15,22 @@
 //! inverse goes from corner to corner to the one before its output, and finds u there by Newton's
 //! method.
 
+use piezotrack_control::OperatorInverse;
 use piezotrack_control::hysteresis::{Operator, PlayState};
-use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse};
 
 use super::cubic_curve::{Cubic, CubicCurve, checked_range};
 use super::prandtl_ishlinskii::{MOST_PLAYS, PlayHysteresis};
-use crate::design::{Gains, LoopPlant};
 use crate::error::{Error, Result, finite, shown};
 use crate::math::rising_root;
-use crate::models::creep::{MOST_RELAXATIONS, Relaxation};
+use crate::models::input::input_model::InputModel;
 use crate::models::input::input_stage::{
-    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, inverse_state, recall_plays,
-    state_at_rest,
+    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, recall_plays, state_at_rest,
 };
 use crate::models::input::superposition::{
     FittedWeights, Places, Plain, PlaySignals, Rest, Signals, SignalsOf, Superposition,
 };
-use crate::models::parameters::dynamics_parameters::DYNAMICS;
 use crate::models::parameters::values::{ParameterInfo, Values};
-use crate::models::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use crate::models::traits::StageModel;
 
 /// Outputs beyond this are none.
 const MOST_OUTPUT: f64 = 1e100;
@@ -49,14 +46,6 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::new("high", "ub", "V"),
     ParameterInfo::list("thresholds", "r", "V"),
     ParameterInfo::list("weights", "w", "m/V"),
-    DYNAMICS[0],
-    DYNAMICS[1],
-    DYNAMICS[2],
-    DYNAMICS[3],
-    DYNAMICS[4],
-    DYNAMICS[5],
-    DYNAMICS[6],
-    DYNAMICS[7],
 ];
 
 /// The operator: plays beside a polynomial, V to m.
@@ -370,56 +359,33 @@ impl OperatorInverse for PolynomialPlaysInverse {
 /// ```
 pub type PolynomialPrandtlIshlinskiiStage = InputStage<PolynomialPlays>;
 
-impl StageModel for PolynomialPrandtlIshlinskiiStage {
-    const INFO: ModelInfo = ModelInfo {
-        name: "polynomial-prandtl-ishlinskii",
-        title: "polynomial Prandtl-Ishlinskii",
-        drive_unit: "V",
-        parameters: PARAMETERS,
-        state: PLAYS_STATE,
-        published: &[],
-    };
+impl InputModel for PolynomialPlays {
+    const NAME: &'static str = "polynomial-prandtl-ishlinskii";
+    const TITLE: &'static str = "polynomial Prandtl-Ishlinskii";
+    const PARAMETERS: &'static [ParameterInfo] = PARAMETERS;
+
+    type Inverse = PolynomialPlaysInverse;
 
     fn build(values: &Values) -> Result<Self> {
         let number = |name| values.number(name);
-        let operator = PolynomialPlays::new(
+        PolynomialPlays::new(
             ["a1", "a2", "a3"].map(number),
             (number("low"), number("high")),
             values.list("thresholds"),
             values.list("weights"),
-        )?;
-        Ok(Self { operator, relaxation: Relaxation::build(values)? })
+        )
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        self.equilibrium_values(voltages)
+    fn path(&self) -> &impl Operator<f64> {
+        self
     }
 
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        self.follow(experiment)
+    fn inverse(&self, _dt: f64) -> Result<Self::Inverse> {
+        Ok(PolynomialPlaysInverse(*self))
     }
 
-    /// On its settled loop between the two voltages.
-    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
-        let gains = Gains::of(&self.operator, low, high, |slope| slope)?;
-        gains.plants(|gain| self.relaxation.loop_plant(gain))
-    }
-}
-
-impl Invertible for PolynomialPrandtlIshlinskiiStage {
-    type Inverse = InputInverse<PolynomialPlaysInverse, MOST_RELAXATIONS>;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(Self::Inverse, InputInverseState<PolynomialPlaysInverseState, MOST_RELAXATIONS>)>
-    {
-        let inverse = self.feedforward(PolynomialPlaysInverse(self.operator), dt)?;
-        let state = self.state(initial)?;
-        let memory = inverse.operator().memory(&state.operator);
-        let start = inverse_state(&inverse, memory, &state.relaxation);
-        Ok((inverse, start))
+    fn start(&self, inverse: &Self::Inverse, state: &Self::State) -> PolynomialPlaysInverseState {
+        inverse.memory(state)
     }
 }
 
@@ -483,7 +449,7 @@ impl Superposition for PolynomialPrandtlIshlinskiiStage {
         let [a1, a2, a3] = sum.map(|coefficient| vec![coefficient]);
         let (low, high) = (vec![of.drive.0], vec![of.drive.1]);
         let operator = [a1, a2, a3, low, high, of.places, weights.to_vec()];
-        Values::of(PARAMETERS, operator.into_iter().chain(of.relaxation.values()))
+        Values::of(Self::INFO.parameters, operator.into_iter().chain(of.relaxation.values()))
     }
 
     /// Without the play of the drive.

@@ -12,22 +12,20 @@
 //! act on p as before: with the signs of all weights turned, the stage does under -u what it did
 //! under u.
 
+use piezotrack_control::PlayInverse;
 use piezotrack_control::hysteresis::{Operator, Play, PlayState};
-use piezotrack_control::{InputInverseState, PlayInverse, PrandtlIshlinskiiInverse};
 
-use crate::design::{Gains, LoopPlant};
 use crate::error::{Error, Result, finite, not_negative, shown};
-use crate::models::creep::{MOST_RELAXATIONS, Relaxation};
+use crate::models::input::input_model::InputModel;
 use crate::models::input::input_stage::{
-    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, inverse_state, recall_plays,
-    state_at_rest,
+    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, recall_plays, state_at_rest,
 };
 use crate::models::input::superposition::{
     FittedWeights, Places, Plain, PlaySignals, Rest, Signals, SignalsOf, Superposition,
 };
-use crate::models::parameters::dynamics_parameters::{DYNAMICS, same_length};
+use crate::models::parameters::dynamics_parameters::same_length;
 use crate::models::parameters::values::{ParameterInfo, Values};
-use crate::models::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use crate::models::traits::StageModel;
 
 /// Most plays of a stage.
 pub const MOST_PLAYS: usize = 32;
@@ -44,14 +42,6 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::list("weights", "w", "m/V"),
     ParameterInfo::list("dead_zone_thresholds", "d", "m"),
     ParameterInfo::list("dead_zone_weights", "s", ""),
-    DYNAMICS[0],
-    DYNAMICS[1],
-    DYNAMICS[2],
-    DYNAMICS[3],
-    DYNAMICS[4],
-    DYNAMICS[5],
-    DYNAMICS[6],
-    DYNAMICS[7],
 ];
 
 /// Plays with dead zones, and how many of the plays are used.
@@ -250,62 +240,38 @@ impl PrandtlIshlinskiiStage {
             plays.dead_zone_thresholds[..*zones].to_vec(),
             plays.dead_zone_weights[..*zones].to_vec(),
         ];
-        Values::of(PARAMETERS, operator.into_iter().chain(self.relaxation.values()))
+        Values::of(Self::INFO.parameters, operator.into_iter().chain(self.relaxation.values()))
     }
 }
 
-impl StageModel for PrandtlIshlinskiiStage {
-    const INFO: ModelInfo = ModelInfo {
-        name: "prandtl-ishlinskii",
-        title: "Prandtl-Ishlinskii",
-        drive_unit: "V",
-        parameters: PARAMETERS,
-        state: PLAYS_STATE,
-        published: &[],
-    };
+impl InputModel for PlayHysteresis {
+    const NAME: &'static str = "prandtl-ishlinskii";
+    const TITLE: &'static str = "Prandtl-Ishlinskii";
+    const PARAMETERS: &'static [ParameterInfo] = PARAMETERS;
+
+    type Inverse = PlayInverse<MOST_PLAYS, MOST_ZONES>;
 
     fn build(values: &Values) -> Result<Self> {
         let list = |name| values.list(name);
-        let operator = PlayHysteresis::new(
+        PlayHysteresis::new(
             values.number("linear"),
             list("thresholds"),
             list("weights"),
             list("dead_zone_thresholds"),
             list("dead_zone_weights"),
-        )?;
-        Ok(Self { operator, relaxation: Relaxation::build(values)? })
+        )
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        self.equilibrium_values(voltages)
+    fn path(&self) -> &impl Operator<f64> {
+        &self.plays
     }
 
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        self.follow(experiment)
+    fn inverse(&self, _dt: f64) -> Result<Self::Inverse> {
+        Ok(PlayInverse::new(&self.plays)?)
     }
 
-    /// On its settled loop between the two voltages.
-    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
-        let gains = Gains::of(&self.operator.plays, low, high, |slope| slope)?;
-        gains.plants(|gain| self.relaxation.loop_plant(gain))
-    }
-}
-
-impl Invertible for PrandtlIshlinskiiStage {
-    type Inverse = PrandtlIshlinskiiInverse<MOST_PLAYS, MOST_ZONES, MOST_RELAXATIONS>;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(Self::Inverse, InputInverseState<PlayState<f64, MOST_PLAYS>, MOST_RELAXATIONS>)>
-    {
-        let plays = &self.operator.plays;
-        let inverse = self.feedforward(PlayInverse::new(plays)?, dt)?;
-        let state = self.state(initial)?;
-        let memory = inverse.operator().memory(plays, &state.operator);
-        let start = inverse_state(&inverse, memory, &state.relaxation);
-        Ok((inverse, start))
+    fn start(&self, inverse: &Self::Inverse, state: &Self::State) -> PlayState<f64, MOST_PLAYS> {
+        inverse.memory(&self.plays, state)
     }
 }
 
@@ -322,7 +288,7 @@ impl Superposition for PrandtlIshlinskiiStage {
         let relaxation = of.relaxation.values();
         let operator =
             [vec![of.linear], of.places, of.weights, of.dead_zone_thresholds, of.dead_zone_weights];
-        Values::of(PARAMETERS, operator.into_iter().chain(relaxation))
+        Values::of(Self::INFO.parameters, operator.into_iter().chain(relaxation))
     }
 
     /// Without the play of the drive.

@@ -23,22 +23,19 @@
 //! and is refused where q is 1 or more: a play would go back where the drive goes on.
 
 use piezotrack_control::hysteresis::{Operator, PlayState};
-use piezotrack_control::{InputInverse, InputInverseState, OperatorInverse, PlayInverse};
+use piezotrack_control::{OperatorInverse, PlayInverse};
 
 use super::prandtl_ishlinskii::{MOST_PLAYS, MOST_ZONES, PlayHysteresis};
-use crate::design::{Gains, LoopPlant};
 use crate::error::{Error, Result, not_negative, positive, shown};
-use crate::models::creep::{MOST_RELAXATIONS, Relaxation};
+use crate::models::input::input_model::InputModel;
 use crate::models::input::input_stage::{
-    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, inverse_state, recall_plays,
-    state_at_rest,
+    InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, recall_plays, state_at_rest,
 };
 use crate::models::input::superposition::{
     FittedWeights, Places, Rest, Shape, Signals, SignalsOf, Superposition,
 };
-use crate::models::parameters::dynamics_parameters::DYNAMICS;
 use crate::models::parameters::values::{ParameterInfo, Values};
-use crate::models::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use crate::models::traits::StageModel;
 
 /// Rounds of Newton's method within a bracket, at most: as many as there are corners, and more.
 const ROUNDS: usize = 200;
@@ -50,14 +47,6 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::new("dilation", "lambda", "s"),
     ParameterInfo::list("dead_zone_thresholds", "d", "m"),
     ParameterInfo::list("dead_zone_weights", "s", ""),
-    DYNAMICS[0],
-    DYNAMICS[1],
-    DYNAMICS[2],
-    DYNAMICS[3],
-    DYNAMICS[4],
-    DYNAMICS[5],
-    DYNAMICS[6],
-    DYNAMICS[7],
 ];
 
 /// Plays that the rate of the input dilates.
@@ -141,15 +130,12 @@ impl Segmented for DilatedPlays {
     }
 }
 
-impl StageModel for RateDependentPrandtlIshlinskiiStage {
-    const INFO: ModelInfo = ModelInfo {
-        name: "rate-dependent-prandtl-ishlinskii",
-        title: "rate-dependent Prandtl-Ishlinskii",
-        drive_unit: "V",
-        parameters: PARAMETERS,
-        state: PLAYS_STATE,
-        published: &[],
-    };
+impl InputModel for DilatedPlays {
+    const NAME: &'static str = "rate-dependent-prandtl-ishlinskii";
+    const TITLE: &'static str = "rate-dependent Prandtl-Ishlinskii";
+    const PARAMETERS: &'static [ParameterInfo] = PARAMETERS;
+
+    type Inverse = DilatedPlaysInverse;
 
     fn build(values: &Values) -> Result<Self> {
         let list = |name| values.list(name);
@@ -161,22 +147,20 @@ impl StageModel for RateDependentPrandtlIshlinskiiStage {
             list("dead_zone_weights"),
         )?;
         let dilation = not_negative("dilation", values.number("dilation"), "s")?;
-        let operator = DilatedPlays { plays, dilation };
-        Ok(Self { operator, relaxation: Relaxation::build(values)? })
+        Ok(DilatedPlays { plays, dilation })
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        self.equilibrium_values(voltages)
+    /// At rest: quicker plays move less.
+    fn path(&self) -> &impl Operator<f64> {
+        &self.plays.plays
     }
 
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        self.follow(experiment)
+    fn inverse(&self, dt: f64) -> Result<Self::Inverse> {
+        DilatedPlaysInverse::new(*self, dt)
     }
 
-    /// On its settled loop between the two voltages, at rest: quicker plays move less.
-    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
-        let gains = Gains::of(&self.operator.plays.plays, low, high, |slope| slope)?;
-        gains.plants(|gain| self.relaxation.loop_plant(gain))
+    fn start(&self, _inverse: &Self::Inverse, state: &Self::State) -> DilatedPlaysInverseState {
+        DilatedPlaysInverseState { operator: *state, begun: false }
     }
 }
 
@@ -304,23 +288,6 @@ impl OperatorInverse for DilatedPlaysInverse {
     }
 }
 
-impl Invertible for RateDependentPrandtlIshlinskiiStage {
-    type Inverse = InputInverse<DilatedPlaysInverse, MOST_RELAXATIONS>;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(Self::Inverse, InputInverseState<DilatedPlaysInverseState, MOST_RELAXATIONS>)>
-    {
-        let inverse = self.feedforward(DilatedPlaysInverse::new(self.operator, dt)?, dt)?;
-        let state = self.state(initial)?;
-        let memory = DilatedPlaysInverseState { operator: state.operator, begun: false };
-        let start = inverse_state(&inverse, memory, &state.relaxation);
-        Ok((inverse, start))
-    }
-}
-
 /// Plays that the rate dilates, after the drive itself.
 #[derive(Clone, Debug)]
 struct DilatedSignals {
@@ -377,7 +344,7 @@ impl Superposition for RateDependentPrandtlIshlinskiiStage {
             of.dead_zone_thresholds,
             of.dead_zone_weights,
         ];
-        Values::of(PARAMETERS, operator.into_iter().chain(relaxation))
+        Values::of(Self::INFO.parameters, operator.into_iter().chain(relaxation))
     }
 
     /// Without the drive.

@@ -13,19 +13,17 @@
 //! finds the weights of pairs on the edge of the condition by least squares, and searches alpha
 //! around them. The pairs are made with the Bernstein polynomials b of the range of the drive.
 
-use piezotrack_control::{InputInverse, InputInverseState};
+use piezotrack_control::hysteresis::Operator;
 
 use super::duhem_operator::{DuhemInverse, DuhemInverseState, DuhemOperator, DuhemParameters};
-use crate::design::{Gains, LoopPlant};
 use crate::error::Result;
-use crate::models::creep::{MOST_RELAXATIONS, Relaxation};
-use crate::models::input::input_stage::{InputStage, Remembering, inverse_state, state_at_rest};
+use crate::models::input::input_model::InputModel;
+use crate::models::input::input_stage::{InputStage, Remembering, state_at_rest};
 use crate::models::input::superposition::{
     FittedWeights, Places, Rest, Shape, Signals, SignalsOf, Superposition,
 };
-use crate::models::parameters::dynamics_parameters::DYNAMICS;
 use crate::models::parameters::values::{ParameterInfo, Values};
-use crate::models::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use crate::models::traits::StageModel;
 
 /// How near the edge of the condition the pairs are, as a share.
 const INSIDE: f64 = 0.999;
@@ -43,14 +41,6 @@ const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::new("g2", "g2", "m/V^3"),
     ParameterInfo::new("low", "ua", "V"),
     ParameterInfo::new("high", "ub", "V"),
-    DYNAMICS[0],
-    DYNAMICS[1],
-    DYNAMICS[2],
-    DYNAMICS[3],
-    DYNAMICS[4],
-    DYNAMICS[5],
-    DYNAMICS[6],
-    DYNAMICS[7],
 ];
 
 /// A stage with the hysteresis of Coleman and Hodgdon at its input.
@@ -81,15 +71,12 @@ const PARAMETERS: &[ParameterInfo] = &[
 /// ```
 pub type DuhemStage = InputStage<DuhemOperator>;
 
-impl StageModel for DuhemStage {
-    const INFO: ModelInfo = ModelInfo {
-        name: "duhem",
-        title: "Duhem",
-        drive_unit: "V",
-        parameters: PARAMETERS,
-        state: DuhemOperator::STATE,
-        published: &[],
-    };
+impl InputModel for DuhemOperator {
+    const NAME: &'static str = "duhem";
+    const TITLE: &'static str = "Duhem";
+    const PARAMETERS: &'static [ParameterInfo] = PARAMETERS;
+
+    type Inverse = DuhemInverse;
 
     fn build(values: &Values) -> Result<Self> {
         let number = |name| values.number(name);
@@ -100,38 +87,19 @@ impl StageModel for DuhemStage {
             low: number("low"),
             high: number("high"),
         };
-        let operator = DuhemOperator::new(parameters)?;
-        Ok(Self { operator, relaxation: Relaxation::build(values)? })
+        DuhemOperator::new(parameters)
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        self.equilibrium_values(voltages)
+    fn path(&self) -> &impl Operator<f64> {
+        self
     }
 
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        self.follow(experiment)
+    fn inverse(&self, _dt: f64) -> Result<Self::Inverse> {
+        Ok(DuhemInverse(*self))
     }
 
-    /// On its settled loop between the two voltages.
-    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
-        let gains = Gains::of(&self.operator, low, high, |slope| slope)?;
-        gains.plants(|gain| self.relaxation.loop_plant(gain))
-    }
-}
-
-impl Invertible for DuhemStage {
-    type Inverse = InputInverse<DuhemInverse, MOST_RELAXATIONS>;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(Self::Inverse, InputInverseState<DuhemInverseState, MOST_RELAXATIONS>)> {
-        let inverse = self.feedforward(DuhemInverse(self.operator), dt)?;
-        let state = self.state(initial)?;
-        let memory = inverse.operator().memory(&state.operator);
-        let start = inverse_state(&inverse, memory, &state.relaxation);
-        Ok((inverse, start))
+    fn start(&self, inverse: &Self::Inverse, state: &Self::State) -> DuhemInverseState {
+        inverse.memory(state)
     }
 }
 
@@ -240,7 +208,7 @@ impl Superposition for DuhemStage {
         let (low, high) = fitted.drive;
         let numbers = [alpha, f[0], f[1], f[2], g[0], g[1], g[2], low, high];
         let operator = numbers.map(|number| vec![number]);
-        Values::of(PARAMETERS, operator.into_iter().chain(fitted.relaxation.values()))
+        Values::of(Self::INFO.parameters, operator.into_iter().chain(fitted.relaxation.values()))
     }
 
     fn state_at_rest(rest: &Rest<'_>) -> Values {

@@ -7,34 +7,24 @@
 //! a fit finds the masses by least squares. Its levels divide the range of the drive. Of masses
 //! that explain a record as well those are found whose neighbours are alike.
 
-use piezotrack_control::{InputInverse, InputInverseState};
+use piezotrack_control::hysteresis::Operator;
 
 use super::everett::{Everett, entry};
 use super::preisach_operator::{PreisachInverse, PreisachInverseState, PreisachOperator};
 use super::reversals::Reversals;
-use crate::design::{Gains, LoopPlant};
 use crate::error::Result;
-use crate::models::creep::{MOST_RELAXATIONS, Relaxation};
-use crate::models::input::input_stage::{InputStage, Remembering, inverse_state, state_at_rest};
+use crate::models::input::input_model::InputModel;
+use crate::models::input::input_stage::{InputStage, Remembering, state_at_rest};
 use crate::models::input::superposition::{
     FittedWeights, Places, Rest, Signals, SignalsOf, Superposition,
 };
-use crate::models::parameters::dynamics_parameters::DYNAMICS;
 use crate::models::parameters::values::{ParameterInfo, Values};
-use crate::models::traits::{Experiment, Invertible, ModelInfo, Response, StageModel};
+use crate::models::traits::StageModel;
 
 const PARAMETERS: &[ParameterInfo] = &[
     ParameterInfo::new("linear", "w0", "m/V"),
     ParameterInfo::list("levels", "v", "V"),
     ParameterInfo::list("masses", "mu", "m"),
-    DYNAMICS[0],
-    DYNAMICS[1],
-    DYNAMICS[2],
-    DYNAMICS[3],
-    DYNAMICS[4],
-    DYNAMICS[5],
-    DYNAMICS[6],
-    DYNAMICS[7],
 ];
 
 /// A stage with relays at its input.
@@ -60,50 +50,28 @@ const PARAMETERS: &[ParameterInfo] = &[
 /// ```
 pub type PreisachStage = InputStage<PreisachOperator>;
 
-impl StageModel for PreisachStage {
-    const INFO: ModelInfo = ModelInfo {
-        name: "preisach",
-        title: "Preisach",
-        drive_unit: "V",
-        parameters: PARAMETERS,
-        state: PreisachOperator::STATE,
-        published: &[],
-    };
+impl InputModel for PreisachOperator {
+    const NAME: &'static str = "preisach";
+    const TITLE: &'static str = "Preisach";
+    const PARAMETERS: &'static [ParameterInfo] = PARAMETERS;
+
+    type Inverse = PreisachInverse;
 
     fn build(values: &Values) -> Result<Self> {
         let (levels, masses) = (values.list("levels"), values.list("masses"));
-        let operator = PreisachOperator::new(values.number("linear"), levels, masses)?;
-        Ok(Self { operator, relaxation: Relaxation::build(values)? })
+        PreisachOperator::new(values.number("linear"), levels, masses)
     }
 
-    fn equilibrium(&self, voltages: &[f64]) -> Result<Values> {
-        self.equilibrium_values(voltages)
+    fn path(&self) -> &impl Operator<f64> {
+        self
     }
 
-    fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {
-        self.follow(experiment)
+    fn inverse(&self, _dt: f64) -> Result<Self::Inverse> {
+        Ok(PreisachInverse(*self))
     }
 
-    /// On its settled loop between the two voltages.
-    fn loop_plants(&self, low: f64, high: f64) -> Result<[LoopPlant; 3]> {
-        let gains = Gains::of(&self.operator, low, high, |slope| slope)?;
-        gains.plants(|gain| self.relaxation.loop_plant(gain))
-    }
-}
-
-impl Invertible for PreisachStage {
-    type Inverse = InputInverse<PreisachInverse, MOST_RELAXATIONS>;
-
-    fn inverse(
-        &self,
-        dt: f64,
-        initial: Option<&Values>,
-    ) -> Result<(Self::Inverse, InputInverseState<PreisachInverseState, MOST_RELAXATIONS>)> {
-        let inverse = self.feedforward(PreisachInverse(self.operator), dt)?;
-        let state = self.state(initial)?;
-        let memory = inverse.operator().memory(&state.operator);
-        let start = inverse_state(&inverse, memory, &state.relaxation);
-        Ok((inverse, start))
+    fn start(&self, inverse: &Self::Inverse, state: &Self::State) -> PreisachInverseState {
+        inverse.memory(state)
     }
 }
 
@@ -196,7 +164,7 @@ impl Superposition for PreisachStage {
     fn values(fitted: &FittedWeights) -> Values {
         let (linear, masses) = with_gain_outside(fitted);
         let operator = [vec![linear], fitted.places.clone(), masses];
-        Values::of(PARAMETERS, operator.into_iter().chain(fitted.relaxation.values()))
+        Values::of(Self::INFO.parameters, operator.into_iter().chain(fitted.relaxation.values()))
     }
 
     fn state_at_rest(rest: &Rest<'_>) -> Values {
