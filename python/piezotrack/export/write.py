@@ -34,7 +34,7 @@ LEFT_OUT = (
 
 @dataclass(frozen=True, kw_only=True)
 class Exported:
-    """What an export has written.
+    """Files that an export has written.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-//! What a loop has to keep for every plant of a set, read off a grid of frequencies.
+//! Requirements that a loop keeps for every plant of a set, read off a grid of frequencies.
 //!
 //! For a search: thousands of controllers against the same plants, whose responses are computed
 //! once. The grid is fine where a plant turns fast; what it says of the best controller is checked
@@ -13,7 +13,7 @@ use crate::error::{Error, Result, positive};
 use crate::math::{C, Jet, Ratio};
 use crate::parts::Law;
 
-/// What every loop of a set keeps.
+/// Requirements that every loop of a set keeps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Requirements {
     /// Least gain margin, a factor above 1.
@@ -75,7 +75,7 @@ pub struct Worst {
     pub plant: usize,
 }
 
-/// What is least good over a set of plants.
+/// Worst margins over a set of plants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Robustness {
     /// Roots outside of the unit circle, of the plant that has most of them.
@@ -201,7 +201,7 @@ impl PlantSet {
         self.dt
     }
 
-    /// What is least good of a controller over the set.
+    /// Worst margins of a controller over the set.
     #[must_use]
     pub fn robustness(&self, controller: &Controller<Law>) -> Robustness {
         let [above, below] = controller.feedback.transfer_function();
