@@ -244,7 +244,7 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
 
 def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]:
     """Write the model and the pictures, those of a second log too."""
-    from .._support.files import make_folder, save_figures, together
+    from .._support.files import make_folder, result_set, save_figures
     from ..identification.views.plot import plot_loop, plot_time, what_was_shown
     from ..identification.views.report import save_identification
 
@@ -261,7 +261,7 @@ def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]
             f"{name}_validation_{panel}": one.figure
             for panel, one in zip(PANELS, axes, strict=True)
         }
-    with together(make_folder(out)) as folder:
+    with result_set(make_folder(out)) as folder:
         written = save_identification(fit, folder)
         written += save_figures(figures, folder)  # type: ignore[arg-type]
     return written

@@ -216,9 +216,9 @@ def _within(
 
 def _write(found: Learning, out: Path, picture: bool) -> list[Path]:
     """Write the table and, where it is asked for, the picture."""
-    from .._support.files import make_folder, save_figures, together
+    from .._support.files import make_folder, result_set, save_figures
 
-    with together(make_folder(out.parent)) as folder:
+    with result_set(make_folder(out.parent)) as folder:
         written = [found.save(folder / out.name)]
         if picture:
             written += save_figures({out.stem: found.plot()}, folder)

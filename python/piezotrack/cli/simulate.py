@@ -46,8 +46,8 @@ def simulate_command(
     from .._support.files import (
         make_folder,
         picture_files,
+        result_set,
         save_figures,
-        together,
         write_columns,
     )
     from .._support.units import drive_word, shown_unit
@@ -75,7 +75,7 @@ def simulate_command(
         f"{drive_word(known.drive_unit)}_{name}": scale * u,
         "displacement_um": 1e6 * x,
     }
-    with together(make_folder(out)) as folder:
+    with result_set(make_folder(out)) as folder:
         written = [write_columns(folder / "simulated.csv", table)]
         picture = plot_response(
             *(t, u, x),
