@@ -96,11 +96,11 @@ WAIT = """
 import os, signal, sys, threading, time, weakref
 from piezotrack.cli import main
 from piezotrack.cli.commands import app
-from piezotrack.cli.error_messages import in_words
+from piezotrack.cli.error_messages import report_errors
 def press():
     signal.raise_signal(signal.SIGINT)
 @app.command("wait")
-@in_words
+@report_errors
 def wait() -> None:
     {}
 sys.argv[1:] = ["wait"]

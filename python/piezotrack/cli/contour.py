@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import DataError, ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .loop_options import (
     MODEL,
     NO_FEEDBACK,
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 __all__ = ["contour_command"]
 
 
-@in_words
+@report_errors
 def contour_command(
     context: typer.Context,
     models: Annotated[

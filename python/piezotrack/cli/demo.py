@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import Json, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
 from .output import Output
 
@@ -25,7 +25,7 @@ PICTURES = ("other_loop", "other_time", "before_and_after")
 RUNS = {"feedforward": "feedforward alone", "pid": "PID alone", "all": "both, repetitive"}
 
 
-@in_words
+@report_errors
 def demo_command(
     out: Out = Path("demo"),
     overwrite: Overwrite = False,

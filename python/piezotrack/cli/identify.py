@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import Interrupted, ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .fit_options import (
     AUTO,
     Asymmetry,
@@ -39,7 +39,7 @@ from .fit_options import (
     of_each_log,
     searched,
 )
-from .interruption import heard
+from .interruption import acknowledge_interrupt
 from .options import (
     Columns,
     DisplacementColumn,
@@ -72,7 +72,7 @@ __all__ = ["identify_command"]
 PANELS = ("loop", "time")
 
 
-@in_words
+@report_errors
 def identify_command(
     context: typer.Context,
     files: LogFiles,
@@ -218,7 +218,7 @@ def _search(logs: list[Dataset], out: Path, kind: str, **arguments: Any) -> Iden
     try:
         return identify(logs[0] if len(logs) == 1 else logs, kind, **arguments)
     except Interrupted as stopped:
-        heard()
+        acknowledge_interrupt()
         if stopped.partial is None:
             raise
         path = stopped.partial.save(make_folder(out) / _partial(kind))

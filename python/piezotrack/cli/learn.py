@@ -11,7 +11,7 @@ import typer
 
 from ..errors import DataError, DeviceError, Interrupted, ParameterError
 from .devices import Rest, connected, with_what_is_kept
-from .error_messages import in_words
+from .error_messages import report_errors
 from .loop_options import (
     PAPER,
     AmplifierBandwidth,
@@ -60,7 +60,7 @@ __all__ = ["learn_command"]
 SIMULATED = ("stage", "feedback", "kp", "ti", "td", "noise_nm", "bandwidth", "seed")
 
 
-@in_words
+@report_errors
 def learn_command(
     context: typer.Context,
     model: ModelFile,

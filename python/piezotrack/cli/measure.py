@@ -9,13 +9,13 @@ import typer
 
 from ..errors import ParameterError
 from .devices import DeviceAddress, Rest, connected
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import Duration, Overwrite, Quiet, list_files
 
 __all__ = ["measure_command"]
 
 
-@in_words
+@report_errors
 def measure_command(
     device: DeviceAddress,
     drive: Annotated[

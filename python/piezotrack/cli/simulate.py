@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import (
     Columns,
     DriveColumn,
@@ -28,7 +28,7 @@ from .output import Output
 __all__ = ["simulate_command"]
 
 
-@in_words
+@report_errors
 def simulate_command(
     model: ModelFile,
     drive_file: Annotated[Path, typer.Argument(metavar="DRIVE", help="Log with time and drive.")],

@@ -10,7 +10,7 @@ import typer
 
 from ..errors import DeviceError, Interrupted, ParameterError
 from .devices import connected, with_what_is_kept
-from .error_messages import in_words
+from .error_messages import report_errors
 from .loop_options import (
     MODEL,
     NO_FEEDBACK,
@@ -75,7 +75,7 @@ BeyondReach = Annotated[
 ]
 
 
-@in_words
+@report_errors
 def track_command(
     context: typer.Context,
     model: ModelFile,
@@ -246,7 +246,7 @@ def _on_device(
     result.show(run.summary(), run.document(), run.save(result.out))
 
 
-@in_words
+@report_errors
 def feedforward_command(
     model: ModelFile,
     reference: Annotated[

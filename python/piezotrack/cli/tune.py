@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .loop_options import AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise, noise_metres
 from .options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  # noqa: TC001 - read by typer
 from .output import Output
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["tune_command"]
 
 
-@in_words
+@report_errors
 def tune_command(
     model: ModelFile,
     reference: Annotated[
