@@ -48,7 +48,7 @@ def measure_command(
     that its hysteresis is known from the start.
     """
     from ..data.log_file import format_to_write
-    from ..hardware.drives import parse_drive
+    from ..hardware.excitations import parse_drive
     from ..hardware.measuring import measure
 
     format_to_write(out)
