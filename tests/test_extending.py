@@ -50,7 +50,7 @@ def test_the_page_names_the_file_where_a_law_is_a_variant() -> None:
     holding = [
         path.relative_to(ROOT).as_posix()
         for path in (ROOT / "rust").rglob("*.rs")
-        if re.search(r"^pub enum Law(State)? \{", path.read_text(encoding="utf-8"), re.MULTILINE)
+        if re.search(r"^ *pub enum Law(State)? \{", path.read_text(encoding="utf-8"), re.MULTILINE)
     ]
     assert holding
     assert all(f"`{path}`" in section for path in holding)
