@@ -27,9 +27,9 @@ pub struct Requirements {
     /// Fastest change of the command, V/s; infinite for any.
     pub slew: f64,
     /// Largest share of samples at which the command is clipped.
-    pub clipped: f64,
+    pub largest_saturation: f64,
     /// Largest rms error over all motions, m; infinite for any.
-    pub error: f64,
+    pub largest_error: f64,
 }
 
 impl Requirements {
@@ -54,13 +54,13 @@ impl Requirements {
             let found = format!("{} V/s", self.slew);
             return Err(Error::parameter("slew", found, "above 0, or infinity"));
         }
-        if self.error.is_nan() || self.error <= 0.0 {
-            let found = format!("{} m", self.error);
+        if self.largest_error.is_nan() || self.largest_error <= 0.0 {
+            let found = format!("{} m", self.largest_error);
             return Err(Error::parameter("largest_error", found, "above 0, or infinity"));
         }
-        if !(0.0..=1.0).contains(&self.clipped) {
+        if !(0.0..=1.0).contains(&self.largest_saturation) {
             let expected = "a share, 0 to 1";
-            return Err(Error::parameter("largest_saturation", self.clipped, expected));
+            return Err(Error::parameter("largest_saturation", self.largest_saturation, expected));
         }
         positive("learning", self.learning, "").map(drop)
     }

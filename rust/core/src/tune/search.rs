@@ -286,10 +286,10 @@ impl Tuning<'_> {
         let weighs = self.effort > 0.0 && self.aim != Aim::Effort;
         let changes = if weighs { self.effort * mean(|one| one.effort) } else { 0.0 };
         let mut excess = excess.max(most(|one| one.slew) / self.required.slew);
-        excess = excess.max(mean(|one| one.rms) / self.required.error);
+        excess = excess.max(mean(|one| one.rms) / self.required.largest_error);
         let clipped = most(|one| one.clipped);
-        if clipped > self.required.clipped {
-            excess = excess.max(1.0 + clipped - self.required.clipped);
+        if clipped > self.required.largest_saturation {
+            excess = excess.max(1.0 + clipped - self.required.largest_saturation);
         }
         let cost = error + changes;
         if cost.is_finite() { (cost, excess) } else { (f64::INFINITY, f64::INFINITY) }
