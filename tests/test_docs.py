@@ -7,9 +7,11 @@ import doctest
 import importlib
 import inspect
 import pkgutil
+import re
 import subprocess
 import sys
 import types
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,6 +83,7 @@ PUBLIC = {
     and not inspect.ismodule(value := getattr(room, name))
     and not isinstance(value, types.UnionType)
 }
+DOC = re.compile(r" *//[/!] ?(.*)")
 CLASSES = {name: value for name, value in PUBLIC.items() if inspect.isclass(value)}
 
 
@@ -115,6 +118,35 @@ def documented(value: Any, *sections: str) -> set[str]:
 
 def parameters(value: Any) -> set[str]:
     return {name.lstrip("*") for name in inspect.signature(value).parameters} - {"self", "cls"}
+
+
+def doc_openings(path: Path) -> list[tuple[int, str]]:
+    """The first line of each doc comment of a Rust source, with its number."""
+    lines = [DOC.match(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    return [
+        (number, line[1])
+        for number, (above, line) in enumerate(pairwise([None, *lines]), 1)
+        if line and not above
+    ]
+
+
+def test_no_docstring_opens_with_a_question() -> None:
+    defined = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    assert not [
+        f"{path.relative_to(ROOT)}:{getattr(node, 'lineno', 1)}"
+        for path in sorted((ROOT / "python").rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, defined) and (ast.get_docstring(node) or "").startswith("What ")
+    ]
+
+
+def test_no_doc_comment_of_rust_opens_with_a_question() -> None:
+    assert not [
+        f"{path.relative_to(ROOT)}:{number}"
+        for path in sorted((ROOT / "rust").rglob("*.rs"))
+        for number, line in doc_openings(path)
+        if line.startswith("What ")
+    ]
 
 
 @pytest.mark.parametrize("name", MEMBERS)

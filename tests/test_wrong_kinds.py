@@ -11,7 +11,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack.control.learning.rules import Convergence, FrequencyRule, LiftedRule
-from soak import judged
+from soak import verdict_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -125,7 +125,7 @@ def test_another_kind_is_refused_in_a_sentence(
     import matplotlib.pyplot as plt
 
     monkeypatch.chdir(tmp_path)
-    faults = {repr(value)[:40]: judged(partial(call, value))[0] for value in ODD}
+    faults = {repr(value)[:40]: verdict_of(partial(call, value))[0] for value in ODD}
     plt.close("all")
     assert {value: found for value, found in faults.items() if found} == {}
 

@@ -15,7 +15,7 @@ import pytest
 import piezotrack as pt
 from commands import HEADING, log_text, write_model
 from piezotrack._support.files import write_document
-from piezotrack._support.result_set import MARKER
+from piezotrack._support.result_files import MARKER
 from piezotrack._support.temporary import is_temporary
 
 pytestmark = pytest.mark.skipif(

@@ -65,15 +65,15 @@ def test_a_signal_while_modules_are_imported_is_one_line(
 SLOWLY = """
 import pathlib, time
 from piezotrack.cli import main
-from piezotrack._support import result_set
-rename, replace = result_set._rename, pathlib.Path.replace
+from piezotrack._support import result_files
+rename, replace = result_files._rename, pathlib.Path.replace
 def slowly(path, target):
     time.sleep(0.05)
     return replace(path, target)
 def begun(*all):
     print("begun", flush=True)
     rename(*all)
-pathlib.Path.replace, result_set._rename = slowly, begun
+pathlib.Path.replace, result_files._rename = slowly, begun
 main()
 """
 
@@ -96,11 +96,11 @@ WAIT = """
 import os, signal, sys, threading, time, weakref
 from piezotrack.cli import main
 from piezotrack.cli.commands import app
-from piezotrack.cli.error_messages import in_words
+from piezotrack.cli.error_messages import report_errors
 def press():
     signal.raise_signal(signal.SIGINT)
 @app.command("wait")
-@in_words
+@report_errors
 def wait() -> None:
     {}
 sys.argv[1:] = ["wait"]

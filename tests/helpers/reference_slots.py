@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from odd_values import Slot, count, number, numbers, signal
+from edge_values import Slot, count, number, numbers, signal
 
 RANGE = {"low": number(0.0, near=1e-5), "high": number(50e-6)}
 TIMES = {"duration": number(4.0), "ramp": number(0.5)}

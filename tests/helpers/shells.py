@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import piezotrack as pt
 from commands import run
 from mutants import changed_document, log
-from soak import LONGEST_MESSAGE, bad_message, judged
+from soak import LONGEST_MESSAGE, bad_message, verdict_of
 
 NUMBERS = ["0.02", "0", "-1", "nan", "inf", "1e-9", "1e9", "1e300", "x", "", "\u0663", "1_0"]
 GAINS = ["0.12", "1e5", *NUMBERS]
@@ -211,7 +211,7 @@ def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]
 def faults_of_command(arguments: list[str]) -> tuple[list[str], int | None]:
     """What a call of the command did that it may not, and its exit code."""
     # Long enough for all that is asked here, on a busy machine too.
-    faults, result = judged(lambda: run(*arguments), after=100.0)
+    faults, result = verdict_of(lambda: run(*arguments), after=100.0)
     if faults:
         return faults, None
     error = result.exception

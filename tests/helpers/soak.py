@@ -84,7 +84,7 @@ class Script:
         function: Any = pt
         for name in path.split(".")[1:]:
             function = getattr(function, name)
-        return self._judged(path, function, args, keywords)
+        return self._verdict_of(path, function, args, keywords)
 
     def on(
         self, owner: Any, name: str, /, *args: Any, finite: bool = True, again: bool = True,
@@ -94,9 +94,9 @@ class Script:
         path = f"{self._name(owner)}.{name}"
         found = getattr(type(owner), name, None)
         if isinstance(found, property) or not callable(found):
-            return self._judged(path, lambda: getattr(owner, name), (), {}, read=True)
+            return self._verdict_of(path, lambda: getattr(owner, name), (), {}, read=True)
         bound = getattr(owner, name)
-        return self._judged(path, bound, args, keywords, finite=finite, again=again)
+        return self._verdict_of(path, bound, args, keywords, finite=finite, again=again)
 
     def judge(self, holds: bool, kind: str, statement: str) -> None:
         """Note where a statement about the last result, {}, does not hold."""
@@ -104,7 +104,7 @@ class Script:
             name = f"v{len(self.made) - 1}"
             self.tally.fail(kind, f"{self.text()}\nassert {statement.format(name)}")
 
-    def _judged(
+    def _verdict_of(
         self, path: str, function: Callable[..., Any], args: tuple[Any, ...],
         keywords: dict[str, Any], *, read: bool = False, finite: bool = True, again: bool = True,
     ) -> Any:  # fmt: skip
@@ -115,7 +115,7 @@ class Script:
         if Script.trace is not None:
             name = re.sub(r"\W+", "_", tally.target)
             (Script.trace / f"{name}.txt").write_text(self.text(), "utf-8", "backslashreplace")
-        faults, value = judged(lambda: function(*args, **keywords))
+        faults, value = verdict_of(lambda: function(*args, **keywords))
         self.refused = value is REFUSED or value is STOPPED
         if self.refused:
             tally.refused += value is REFUSED
@@ -191,11 +191,11 @@ class Alarm:
         faulthandler.cancel_dump_traceback_later()
 
 
-def judged(call: Callable[[], Any], *, after: float = LONG) -> tuple[list[str], Any]:
+def verdict_of(call: Callable[[], Any], *, after: float = LONG) -> tuple[list[str], Any]:
     """What a call did that it may not, and its result, `REFUSED` or `STOPPED`."""
     try:
         Alarm.set(after)
-        return _judged(call)
+        return _verdict_of(call)
     except TimeUpError:
         # It rang when the call was over.
         return [], STOPPED
@@ -203,7 +203,7 @@ def judged(call: Callable[[], Any], *, after: float = LONG) -> tuple[list[str], 
         Alarm.off()
 
 
-def _judged(call: Callable[[], Any]) -> tuple[list[str], Any]:
+def _verdict_of(call: Callable[[], Any]) -> tuple[list[str], Any]:
     faults: list[str] = []
     value: Any = REFUSED
     began = time.perf_counter()
@@ -233,7 +233,7 @@ def _judged(call: Callable[[], Any]) -> tuple[list[str], Any]:
 
 def repeated(call: Callable[[], Any], value: Any) -> list[str]:
     """Whether the same call gives another result."""
-    faults, second = judged(call)
+    faults, second = verdict_of(call)
     if faults or second is STOPPED:
         return faults
     return [] if same(value, second) else ["differs when repeated"]

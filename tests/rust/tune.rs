@@ -185,8 +185,8 @@ fn required() -> Requirements {
         sensitivity: 2.0,
         learning: 1.0,
         slew: f64::INFINITY,
-        clipped: 0.0,
-        error: f64::INFINITY,
+        largest_saturation: 0.0,
+        largest_error: f64::INFINITY,
     }
 }
 

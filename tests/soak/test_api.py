@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 import all_stages
 import piezotrack as pt
-from hunt import hunt
-from odd_values import (
+from edge_values import (
     Slot,
     anything,
     arguments,
@@ -25,6 +24,7 @@ from odd_values import (
     truth,
     word,
 )
+from fuzzing import fuzz
 from piezotrack.stages.registry import MODELS
 from reference_slots import OTHER_FORMS, PATHS, REFERENCES
 from soak import Script, Tally
@@ -483,6 +483,6 @@ def test_a_call_answers_or_refuses_in_a_sentence(
 ) -> None:
     tally = Tally(name)
     calls = int(request.config.getoption("--soak-calls") * share / SHARES)
-    hunt(tally, body, calls=calls, start=request.config.getoption("--soak-seed"))
+    fuzz(tally, body, calls=calls, start=request.config.getoption("--soak-seed"))
     record_property("tally", tally.row())
     tally.verdict()

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from hunt import hunt
+from fuzzing import fuzz
 from mutants import models
 from shells import faults_of_command, invocations
 from soak import Script, Tally
@@ -42,6 +42,6 @@ def test_a_command_answers_or_refuses(
             tally.fail(f"{arguments[0]}: {fault}", json.dumps(find))
 
     calls = int(request.config.getoption("--soak-files") * SHARE / 2)
-    hunt(tally, body, calls=calls, start=request.config.getoption("--soak-seed"))
+    fuzz(tally, body, calls=calls, start=request.config.getoption("--soak-seed"))
     record_property("tally", tally.row())
     tally.verdict()

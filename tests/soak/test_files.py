@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from doors import READERS, faults_of_file
-from hunt import hunt
+from file_readers import READERS, faults_of_file
+from fuzzing import fuzz
 from mutants import TABLES, binaries, binary_logs, documents, models, tables
 from soak import Script, Tally
 
@@ -51,6 +51,6 @@ def test_a_mutated_file_is_read_or_refused(
             tally.fail(fault, repr(content))
 
     files = int(request.config.getoption("--soak-files") * SHARES[kind] / sum(SHARES.values()))
-    hunt(tally, body, calls=files, start=request.config.getoption("--soak-seed"))
+    fuzz(tally, body, calls=files, start=request.config.getoption("--soak-seed"))
     record_property("tally", tally.row())
     tally.verdict()

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from doors import READERS, faults_of_file
+from file_readers import READERS, faults_of_file
 from shells import faults_of_command
-from soak import NAMES, REFUSED, judged, not_finite
+from soak import NAMES, REFUSED, not_finite, verdict_of
 
 FINDS = Path(__file__).parent / "finds"
 
@@ -33,7 +33,7 @@ def test_calls(path: Path) -> None:
             refused |= made
             continue
         code = compile(ast.Module([statement], []), path.name, "exec")
-        faults, value = judged(partial(exec, code, names))
+        faults, value = verdict_of(partial(exec, code, names))
         assert faults == [], ast.unparse(statement)[:300]
         if value is REFUSED:
             refused |= made

@@ -17,11 +17,11 @@ from soak import (
     REFUSED,
     Script,
     Tally,
-    judged,
     literal,
     not_finite,
     repeated,
     table,
+    verdict_of,
 )
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Panic(BaseException):
     ],
 )
 def test_a_fault_is_named(call: Callable[[], object], fault: str) -> None:
-    assert judged(call)[0] == [fault]
+    assert verdict_of(call)[0] == [fault]
 
 
 def test_a_fault_of_the_package_is_told_from_one_beside_it() -> None:
@@ -62,16 +62,16 @@ def test_a_fault_of_the_package_is_told_from_one_beside_it() -> None:
         compile("def fail(): raise TypeError('x')", "/piezotrack/tests/helpers/x.py", "exec"),
         beside,
     )
-    assert judged(beside["fail"])[0] == ["TypeError outside: x"]
+    assert verdict_of(beside["fail"])[0] == ["TypeError outside: x"]
     source = str(PACKAGE / "control" / "controller.py")
     exec(compile("def fail(): raise TypeError('x')", source, "exec"), beside)
-    assert judged(beside["fail"])[0] == ["TypeError in controller.py:fail: x"]
+    assert verdict_of(beside["fail"])[0] == ["TypeError in controller.py:fail: x"]
 
 
 def test_what_may_come_is_no_fault() -> None:
-    assert judged(lambda: 1) == ([], 1)
-    assert judged(raising(pt.ParameterError("dt is 0: expected more"))) == ([], REFUSED)
-    assert judged(raising(MemoryError())) == ([], REFUSED)
+    assert verdict_of(lambda: 1) == ([], 1)
+    assert verdict_of(raising(pt.ParameterError("dt is 0: expected more"))) == ([], REFUSED)
+    assert verdict_of(raising(MemoryError())) == ([], REFUSED)
 
 
 def test_results_are_searched_for_numbers_that_are_not_finite() -> None:

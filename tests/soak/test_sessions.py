@@ -8,8 +8,8 @@ import pytest
 from hypothesis import strategies as st
 
 import piezotrack as pt
-from hunt import hunt
-from odd_values import Slot, arguments, number
+from edge_values import Slot, arguments, number
+from fuzzing import fuzz
 from soak import Script, Tally
 
 if TYPE_CHECKING:
@@ -97,6 +97,6 @@ def test_a_session_stays_within_its_limits(
 ) -> None:
     tally = Tally(f"sessions, part {part + 1}")
     calls = int(0.2 * request.config.getoption("--soak-calls"))
-    hunt(tally, drive, calls=calls, start=request.config.getoption("--soak-seed"))
+    fuzz(tally, drive, calls=calls, start=request.config.getoption("--soak-seed"))
     record_property("tally", tally.row())
     tally.verdict()

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import DataError
 from .arguments import expect
 from .plot_style import without_glyph_warnings
-from .result_set import MARKER, current_set, finish_others, together
+from .result_files import MARKER, current_set, finish_others, result_set
 from .temporary import create, forget
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ __all__ = [
     "make_folder",
     "picture_files",
     "replacing",
+    "result_set",
     "save_figures",
-    "together",
     "write_columns",
     "write_document",
     "write_result",
@@ -43,7 +43,7 @@ ENDINGS = ("png", "svg")
 def replacing(path: str | os.PathLike[str], *, synced: bool = False) -> Iterator[Path]:
     """Write to a temporary file beside `path`, which is renamed on success.
 
-    Within `together` it is renamed at the end of that.
+    Within `result_set` it is renamed at the end of that.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
 
     written = []
     try:
-        with together(folder), without_glyph_warnings():
+        with result_set(folder), without_glyph_warnings():
             for name, figure in figures.items():
                 for file in picture_files(name):
                     path = folder / file
@@ -266,7 +266,7 @@ def write_result(
     DataError
         The folder cannot be made or written to.
     """
-    with together(make_folder(folder)) as path:
+    with result_set(make_folder(folder)) as path:
         tables = [] if columns is None else [write_columns(path / f"{name}.csv", columns)]
         return [
             *tables,

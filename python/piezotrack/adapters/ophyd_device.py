@@ -22,7 +22,7 @@ PATIENCE = 10.0
 
 
 class PlayStatus(StrictEnum):
-    """What the record ``Status`` says of the last play."""
+    """Status of the last play, as the record ``Status`` has it."""
 
     IDLE = "idle"
     PLAYING = "playing"

@@ -13,8 +13,8 @@ from .._support.files import (
     make_folder,
     picture_files,
     replacing,
+    result_set,
     save_figures,
-    together,
     write_document,
 )
 from .._support.messages import quoted
@@ -231,7 +231,7 @@ class Benchmark(Result):
         DataError
             The folder cannot be made or written to.
         """
-        with together(make_folder(folder)) as path:
+        with result_set(make_folder(folder)) as path:
             page = path / f"{NAME}.md"
             with replacing(page) as temporary:
                 temporary.write_text(self.markdown() + "\n", encoding="utf-8")

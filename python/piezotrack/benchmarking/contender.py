@@ -28,7 +28,7 @@ class Fitted(Protocol):
 
     @property
     def chosen(self) -> str:
-        """What was chosen, in words; empty where nothing was."""
+        """Structure that was chosen, in words; empty where nothing was."""
 
     @property
     def parameters(self) -> Mapping[str, float]:

@@ -1,4 +1,4 @@
-"""What a person writes in a quarter of an hour: plays, a delay, and non-negative least squares."""
+"""The model of a quarter of an hour: plays, a delay, and non-negative least squares."""
 
 from __future__ import annotations
 

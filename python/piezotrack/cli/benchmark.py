@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import DataError, ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import (
     Columns,
     DisplacementColumn,
@@ -39,7 +39,7 @@ __all__ = ["benchmark_command"]
 SAID = ("train", "test", "other", "other-test")
 
 
-@in_words
+@report_errors
 def benchmark_command(
     context: typer.Context,
     files: Annotated[

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import DataError, Interrupted, ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .fit_options import (
     Asymmetry,
     Bound,
@@ -35,7 +35,7 @@ from .fit_options import (
     drift_asked,
     searched,
 )
-from .interruption import heard
+from .interruption import acknowledge_interrupt
 from .options import (
     Columns,
     DisplacementColumn,
@@ -63,7 +63,7 @@ __all__ = ["campaign_command"]
 PARQUET = "campaign.parquet"
 
 
-@in_words
+@report_errors
 def campaign_command(
     context: typer.Context,
     files: Annotated[
@@ -178,7 +178,7 @@ def campaign_command(
         try:
             found = campaign(logs, models, numbers, executor, folder=out, progress=result.progress)
         except Interrupted:
-            heard()
+            acknowledge_interrupt()
             raise
     written = [out / "campaign.json", *dict.fromkeys(one.file for one in found)]
     written += save_figures({"campaign": found.plot()}, out)

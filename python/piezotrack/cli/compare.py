@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..stages.model_info import LISTED
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import (
     Columns,
     DisplacementColumn,
@@ -33,7 +33,7 @@ from .output import Output
 __all__ = ["compare_command"]
 
 
-@in_words
+@report_errors
 def compare_command(
     context: typer.Context,
     file: LogFile,

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ..errors import ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .loop_options import (
     PAPER,
     AmplifierBandwidth,
@@ -39,7 +39,7 @@ SPELLINGS = {
 }
 
 
-@in_words
+@report_errors
 def compare_controllers_command(
     context: typer.Context,
     model: ModelFile,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import DataError, ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .loop_options import (
     MODEL,
     NO_FEEDBACK,
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
 __all__ = ["contour_command"]
 
 
-@in_words
+@report_errors
 def contour_command(
     context: typer.Context,
     models: Annotated[
@@ -311,7 +311,7 @@ def _write_table(table: Table2, out: Path) -> list[Path]:
     """Write the table with published and obtained values, and the pictures."""
     import numpy as np
 
-    from .._support.files import make_folder, save_figures, together, write_columns
+    from .._support.files import make_folder, result_set, save_figures, write_columns
     from ..xu_li_2010.table_2 import PUBLISHED
 
     columns = {
@@ -329,6 +329,6 @@ def _write_table(table: Table2, out: Path) -> list[Path]:
     figures = {"table_2": table.plot()}
     for case, run in zip(PUBLISHED, table.runs, strict=True):
         figures[_circle(case)] = run.plot()
-    with together(make_folder(out)) as folder:
+    with result_set(make_folder(out)) as folder:
         written = write_columns(folder / "table_2.csv", arrays)
         return [written, *save_figures(figures, folder)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..errors import ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import (
     Columns,
     DisplacementColumn,
@@ -22,7 +22,7 @@ from .options import (
 __all__ = ["convert_command"]
 
 
-@in_words
+@report_errors
 def convert_command(
     file: LogFile,
     out: OutFile,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import Json, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
 from .output import Output
 
@@ -25,7 +25,7 @@ PICTURES = ("other_loop", "other_time", "before_and_after")
 RUNS = {"feedforward": "feedforward alone", "pid": "PID alone", "all": "both, repetitive"}
 
 
-@in_words
+@report_errors
 def demo_command(
     out: Out = Path("demo"),
     overwrite: Overwrite = False,
@@ -44,7 +44,7 @@ def demo_command(
 
 def _measured(result: Output, seed: int) -> None:
     """Run the demonstration on the two measured logs of the package."""
-    from .._support.files import make_folder, picture_files, save_figures, together
+    from .._support.files import make_folder, picture_files, result_set, save_figures
     from ..data.log_file import write_log
     from ..identification.views.plot import plot_loop, plot_time, what_was_shown
     from ..identification.views.report import identification_files, save_identification
@@ -63,7 +63,7 @@ def _measured(result: Output, seed: int) -> None:
         plot_time(other, run, stroke=fit.stroke, title=title)[0].figure,
         plot_before_and_after(found.runs),
     )
-    with together(make_folder(result.out)) as folder:
+    with result_set(make_folder(result.out)) as folder:
         written = [
             write_log(found.log, folder / "log.csv"),
             write_log(other.full, folder / "other.csv"),
@@ -112,7 +112,7 @@ def _commands(out: Path) -> list[str]:
 
 def _paper(result: Output, seed: int) -> None:
     """Run the demonstration of the paper: its stage, simulated, and its model."""
-    from .._support.files import make_folder, picture_files, save_figures, together
+    from .._support.files import make_folder, picture_files, result_set, save_figures
     from ..data.log_file import write_log
     from ..identification.views.report import identification_files, save_identification
     from ..xu_li_2010.demo import demo_log, identify_demo, track_demo
@@ -123,7 +123,7 @@ def _paper(result: Output, seed: int) -> None:
     fit = identify_demo(log, seed=seed, progress=result.progress)
     rest = fit.score(log.full[fit.data.t[-1] :], offset=fit.offset)
     runs = track_demo(fit, seed)
-    with together(make_folder(result.out)) as folder:
+    with result_set(make_folder(result.out)) as folder:
         written = [write_log(log, folder / "log.csv")]
         written += save_identification(fit, folder, shown=log)
         written += save_figures({f"track_{name}": run.plot() for name, run in runs.items()}, folder)

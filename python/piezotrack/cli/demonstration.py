@@ -43,7 +43,7 @@ FEEDBACK = Pid.from_um(kp=0.03, ti=0.02, td=0.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Demonstration:
-    """What the demonstration computes.
+    """Results that the demonstration computes.
 
     Attributes
     ----------

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import Interrupted, PiezotrackError
-from .interruption import heard
+from .interruption import acknowledge_interrupt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -44,7 +44,7 @@ def with_what_is_kept(
     done, for words where it cannot be written.
     """
     if isinstance(error, Interrupted):
-        heard()
+        acknowledge_interrupt()
     if error.partial is None:
         return error
     try:

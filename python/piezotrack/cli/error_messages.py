@@ -22,7 +22,7 @@ from .terminal import one_line
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["in_words", "of_the_system"]
+__all__ = ["of_the_system", "report_errors"]
 
 BAD_INPUT = 2
 NOT_PRINTED = 1
@@ -37,7 +37,7 @@ CODEC = re.compile(r"^(?:de|en)coding with '[^']*' codec failed \(KeyboardInterr
 P = ParamSpec("P")
 
 
-def in_words(command: Callable[P, None]) -> Callable[P, None]:
+def report_errors(command: Callable[P, None]) -> Callable[P, None]:
     """Turn the exceptions of piezotrack into one sentence and an exit code."""
     parameters = list(signature(command).parameters)
 

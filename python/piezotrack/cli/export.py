@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..errors import ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import (
     Duration,
     Json,
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["export_command"]
 
 
-@in_words
+@report_errors
 def export_command(
     context: typer.Context,
     controller: Annotated[

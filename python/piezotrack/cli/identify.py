@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import Interrupted, ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .fit_options import (
     AUTO,
     Asymmetry,
@@ -40,7 +40,7 @@ from .fit_options import (
     of_each_log,
     searched,
 )
-from .interruption import heard
+from .interruption import acknowledge_interrupt
 from .options import (
     Columns,
     DisplacementColumn,
@@ -74,7 +74,7 @@ __all__ = ["identify_command"]
 PANELS = ("loop", "time")
 
 
-@in_words
+@report_errors
 def identify_command(
     context: typer.Context,
     files: LogFiles,
@@ -233,7 +233,7 @@ def _search(records: list[Record], out: Path, kind: str, **arguments: Any) -> Id
     try:
         return identify(records[0] if len(records) == 1 else records, kind, **arguments)
     except Interrupted as stopped:
-        heard()
+        acknowledge_interrupt()
         if stopped.partial is None:
             raise
         path = stopped.partial.save(make_folder(out) / _partial(kind))
@@ -259,7 +259,7 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
 
 def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]:
     """Write the model and the pictures, those of a second log too."""
-    from .._support.files import make_folder, save_figures, together
+    from .._support.files import make_folder, result_set, save_figures
     from ..identification.views.plot import plot_loop, plot_time, what_was_shown
     from ..identification.views.report import save_identification
 
@@ -276,7 +276,7 @@ def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]
             f"{name}_validation_{panel}": one.figure
             for panel, one in zip(PANELS, axes, strict=True)
         }
-    with together(make_folder(out)) as folder:
+    with result_set(make_folder(out)) as folder:
         written = save_identification(fit, folder)
         written += save_figures(figures, folder)  # type: ignore[arg-type]
     return written

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_text
 
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import (
     Columns,
     DisplacementColumn,
@@ -19,7 +19,7 @@ from .options import (
 __all__ = ["info_command"]
 
 
-@in_words
+@report_errors
 def info_command(
     file: LogFile,
     time: TimeColumn = None,

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from types import FrameType
 
 __all__ = [
+    "acknowledge_interrupt",
     "answer_signals",
     "at_rest",
     "at_work",
     "exit_code",
-    "heard",
     "leave_if_stopped",
     "stopped",
 ]
@@ -67,10 +67,10 @@ def at_rest() -> None:
     global _working
     _working = False
     # A repetition that comes late in the end of the process would kill it.
-    heard()
+    acknowledge_interrupt()
 
 
-def heard() -> None:
+def acknowledge_interrupt() -> None:
     """Declare that the interruption has arrived, and is not to be repeated."""
     _repeat_in(0.0)
 

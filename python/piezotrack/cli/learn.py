@@ -11,7 +11,7 @@ import typer
 
 from ..errors import DataError, DeviceError, Interrupted, ParameterError
 from .devices import Rest, connected, with_what_is_kept
-from .error_messages import in_words
+from .error_messages import report_errors
 from .loop_options import (
     PAPER,
     AmplifierBandwidth,
@@ -60,7 +60,7 @@ __all__ = ["learn_command"]
 SIMULATED = ("stage", "feedback", "kp", "ti", "td", "noise_nm", "bandwidth", "seed")
 
 
-@in_words
+@report_errors
 def learn_command(
     context: typer.Context,
     model: ModelFile,
@@ -216,9 +216,9 @@ def _within(
 
 def _write(found: Learning, out: Path, picture: bool) -> list[Path]:
     """Write the table and, where it is asked for, the picture."""
-    from .._support.files import make_folder, save_figures, together
+    from .._support.files import make_folder, result_set, save_figures
 
-    with together(make_folder(out.parent)) as folder:
+    with result_set(make_folder(out.parent)) as folder:
         written = [found.save(folder / out.name)]
         if picture:
             written += save_figures({out.stem: found.plot()}, folder)

@@ -9,13 +9,13 @@ import typer
 
 from ..errors import ParameterError
 from .devices import DeviceAddress, Rest, connected
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import Duration, Overwrite, Quiet, list_files
 
 __all__ = ["measure_command"]
 
 
-@in_words
+@report_errors
 def measure_command(
     device: DeviceAddress,
     drive: Annotated[
@@ -48,7 +48,7 @@ def measure_command(
     that its hysteresis is known from the start.
     """
     from ..data.log_file import format_to_write
-    from ..hardware.drives import parse_drive
+    from ..hardware.excitations import parse_drive
     from ..hardware.measuring import measure
 
     format_to_write(out)

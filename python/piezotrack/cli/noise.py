@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import (
     Columns,
     DisplacementColumn,
@@ -26,7 +26,7 @@ from .output import Output
 __all__ = ["noise_command"]
 
 
-@in_words
+@report_errors
 def noise_command(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Log of a sensor at rest.")],
     window: Annotated[

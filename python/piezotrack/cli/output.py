@@ -1,4 +1,4 @@
-"""What a command prints and where it writes: words, one JSON document, or nothing."""
+"""Output of a command: words, one JSON document, or nothing, and where it writes."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .devices import DeviceAddress, Rest, connected
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import Duration, Json, Out, Overwrite, Period, Quiet  # noqa: TC001, typer reads it
 from .output import Output
 from .track import parsed_reference
@@ -16,7 +16,7 @@ from .track import parsed_reference
 __all__ = ["play_command"]
 
 
-@in_words
+@report_errors
 def play_command(
     file: Annotated[
         Path,

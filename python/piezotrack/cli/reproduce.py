@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import Json, Out, Overwrite, Quiet, refuse_without_effect
 from .output import Output
 
 __all__ = ["reproduce_command"]
 
 
-@in_words
+@report_errors
 def reproduce_command(
     context: typer.Context,
     out: Out = Path("report"),

@@ -13,7 +13,7 @@ import typer
 
 from ..errors import ParameterError
 from .devices import connected
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import number_range, refuse_without_effect
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ OTHERS = {
 }
 
 
-@in_words
+@report_errors
 def serve_command(
     context: typer.Context,
     protocol: Annotated[

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import (
     Columns,
     DriveColumn,
@@ -28,7 +28,7 @@ from .output import Output
 __all__ = ["simulate_command"]
 
 
-@in_words
+@report_errors
 def simulate_command(
     model: ModelFile,
     drive_file: Annotated[Path, typer.Argument(metavar="DRIVE", help="Log with time and drive.")],
@@ -46,8 +46,8 @@ def simulate_command(
     from .._support.files import (
         make_folder,
         picture_files,
+        result_set,
         save_figures,
-        together,
         write_columns,
     )
     from .._support.units import drive_word, shown_unit
@@ -75,7 +75,7 @@ def simulate_command(
         f"{drive_word(known.drive_unit)}_{name}": scale * u,
         "displacement_um": 1e6 * x,
     }
-    with together(make_folder(out)) as folder:
+    with result_set(make_folder(out)) as folder:
         written = [write_columns(folder / "simulated.csv", table)]
         picture = plot_response(
             *(t, u, x),

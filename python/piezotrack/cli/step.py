@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..errors import ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .options import (
     Columns,
     DisplacementColumn,
@@ -31,7 +31,7 @@ from .output import Output
 __all__ = ["step_command"]
 
 
-@in_words
+@report_errors
 def step_command(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Log of a step response.")],
     window: Annotated[

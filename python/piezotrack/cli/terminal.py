@@ -1,4 +1,4 @@
-"""What is printed: characters that would steer the terminal are shown as Python writes them."""
+"""Safe printing: characters that would steer the terminal are shown as Python writes them."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import typer
 
 from ..errors import DeviceError, Interrupted, ParameterError
 from .devices import connected, with_what_is_kept
-from .error_messages import in_words
+from .error_messages import report_errors
 from .loop_options import (
     MODEL,
     NO_FEEDBACK,
@@ -75,7 +75,7 @@ BeyondReach = Annotated[
 ]
 
 
-@in_words
+@report_errors
 def track_command(
     context: typer.Context,
     model: ModelFile,
@@ -246,7 +246,7 @@ def _on_device(
     result.show(run.summary(), run.document(), run.save(result.out))
 
 
-@in_words
+@report_errors
 def feedforward_command(
     model: ModelFile,
     reference: Annotated[
@@ -275,7 +275,7 @@ def feedforward_command(
     quiet: Quiet = False,
 ) -> None:
     """Compute the feedforward voltage for a reference."""
-    from .._support.files import make_folder, picture_files, save_figures, together, write_columns
+    from .._support.files import make_folder, picture_files, result_set, save_figures, write_columns
     from .._support.units import drive_word, shown_unit
     from ..control.loop.preconditions import check_within_reach
     from ..control.plant import plant_of
@@ -302,7 +302,7 @@ def feedforward_command(
     what = drive_word(known.drive_unit)
     shown = scale * voltage
     table = {"time_s": samples.t, f"{what}_{unit}": shown, "displacement_um": 1e6 * samples.x}
-    with together(make_folder(out)) as folder:
+    with result_set(make_folder(out)) as folder:
         written = [write_columns(folder / "feedforward.csv", table)]
         title = f"feedforward ({known.model.info.title}) for {desired.name}"
         picture = plot_feedforward(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import ParameterError
-from .error_messages import in_words
+from .error_messages import report_errors
 from .loop_options import AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise, noise_metres
 from .options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  # noqa: TC001 - read by typer
 from .output import Output
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["tune_command"]
 
 
-@in_words
+@report_errors
 def tune_command(
     model: ModelFile,
     reference: Annotated[
@@ -182,9 +182,9 @@ def _document(tuned: Tuned) -> dict[str, Any]:
 
 def _write(tuned: Tuned, document: dict[str, Any], out: Path) -> list[Path]:
     """Write report and controller as JSON, and a picture of the loop along each reference."""
-    from .._support.files import make_folder, save_figures, together, write_document
+    from .._support.files import make_folder, result_set, save_figures, write_document
 
-    with together(make_folder(out)) as folder:
+    with result_set(make_folder(out)) as folder:
         pictures = {_name(i): run.plot() for i, run in enumerate(tuned.report.runs)}
         return [
             write_document(folder / "tuning.json", document),

@@ -72,7 +72,7 @@ class Column:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """What a caller may name the column by, the surest first."""
+        """Names by which a caller may call the column, the surest first."""
         path = f"{self.group}/{self.name}" if self.group else self.name
         return (self.title, path, self.last or self.title, self.name)
 

@@ -75,7 +75,7 @@ class TimeFeatures:
 
 @dataclass(frozen=True)
 class DriveFeatures:
-    """What the drive of a record does.
+    """Features of the drive of a record.
 
     Attributes
     ----------

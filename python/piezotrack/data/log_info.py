@@ -1,4 +1,4 @@
-"""What a log has in it, and which models it can determine."""
+"""Contents of a log, and the models it can determine."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class ColumnInfo:
 
 @dataclass(frozen=True)
 class LogInfo:
-    """What a log has in it.
+    """Contents of a log.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What comes before the control in C: tests of numbers, readings, filters of the measurement."""
+"""Input of the control in C: tests of numbers, readings, filters of the measurement."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ UNLEARNT = Field("real", "unlearnt", "error that is yet to be learnt, m")
 
 
 class Shape(NamedTuple):
-    """What the composing functions have to know of the parts.
+    """Description of the parts for the functions that compose the loop.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What C is made of: numbers that are printed exactly, constants, and the fields of a state."""
+"""Elements of C: numbers that are printed exactly, constants, and the fields of a state."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from .. import _core
 from .._support.arguments import expect, one_of
-from .._support.files import make_folder, replacing, together, write_document
+from .._support.files import make_folder, replacing, result_set, write_document
 from ..control.controller.controller import Controller
 from ..errors import ParameterError
 from ..references.reference import Reference
@@ -34,7 +34,7 @@ LEFT_OUT = (
 
 @dataclass(frozen=True, kw_only=True)
 class Exported:
-    """What an export has written.
+    """Files that an export has written.
 
     Attributes
     ----------
@@ -185,7 +185,7 @@ def export_controller(
 def _written(files: dict[str, bytes], folder: str | os.PathLike[str]) -> tuple[Path, ...]:
     """Write the files in one go."""
     paths = []
-    with together(make_folder(folder)) as there:
+    with result_set(make_folder(folder)) as there:
         for key, content in files.items():
             with replacing(there / key) as temporary:
                 temporary.write_bytes(content)

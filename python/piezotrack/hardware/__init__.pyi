@@ -13,9 +13,9 @@ from .device import Device as Device
 from .device import Exchanging as Exchanging
 from .device import Rates as Rates
 from .device import Record as Record
-from .drives import Drive as Drive
-from .drives import decaying as decaying
-from .drives import parse_drive as parse_drive
+from .excitations import Drive as Drive
+from .excitations import decaying as decaying
+from .excitations import parse_drive as parse_drive
 from .measuring import measure as measure
 from .pacing import RoundTrip as RoundTrip
 from .pacing import play_paced as play_paced

@@ -1,4 +1,4 @@
-"""What piezotrack asks of a device: a table of voltages out, a record of displacements back."""
+"""Protocol of a device: a table of voltages out, a record of displacements back."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Rates:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Record:
-    """What came back from a table that was played.
+    """Displacements that came back from a table that was played.
 
     Sample k of `displacement` is read on the clock edge at which sample k of `volts` goes out; each
     voltage is held until the next.

@@ -13,7 +13,7 @@ from ..data.dataset import Dataset
 from ..data.dataset_arguments import MIN_SAMPLES
 from ..errors import DataError, DeviceError, ParameterError
 from .device import Device, Record
-from .drives import Drive, parse_drive
+from .excitations import Drive, parse_drive
 from .safe_end import led_back
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""What stands around a virtual stage: amplifier, sensor, and the cycles before an experiment."""
+"""Surroundings of a virtual stage: amplifier, sensor, and the cycles before an experiment."""
 
 from __future__ import annotations
 

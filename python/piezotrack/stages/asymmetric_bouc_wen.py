@@ -34,10 +34,6 @@ class AsymmetricBoucWenStage(Stage):
 
     Parameters
     ----------
-    mass : float
-        m [kg], above 0.
-    damping : float
-        b [N s/m], 0 or above.
     stiffness : float
         k [N/m], above 0. The displacement depends on m/k and b/k only.
     piezo_coefficient : float
@@ -53,10 +49,6 @@ class AsymmetricBoucWenStage(Stage):
     sign_asymmetry : float, optional
         epsilon [1/V]: it decays faster by epsilon where h is above 0, and more slowly by epsilon
         where it is below 0. A search holds it at 0 unless something is said of it.
-    creep_weights : sequence of float, optional
-        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
-    creep_times : sequence of float, optional
-        tau [s], as many: see `Stage`.
 
     Raises
     ------

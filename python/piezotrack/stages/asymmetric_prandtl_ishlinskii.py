@@ -51,14 +51,6 @@ class AsymmetricPrandtlIshlinskiiStage(Stage):
         s [V] and v [m/V] of the plays of f(u), as those of the drive.
     convex_thresholds, convex_weights : sequence of float, optional
         t [V] and c [m/V] of the plays of g(u), as those of the drive.
-    creep_weights, creep_times : sequence of float, optional
-        c and tau [s] of each relaxation of the creep; 8 at most.
-    time_constant : float, optional
-        T [s] of a first-order lag.
-    frequency, damping_ratio : float, optional
-        Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
-    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
-        g, undamped frequency [Hz] and damping ratio of further modes in parallel; 3 at most.
 
     Raises
     ------

@@ -15,6 +15,7 @@ from ..errors import ParameterError
 from .inverse import Inverse
 from .model_info import LISTED, ModelInfo
 from .motion import Response, numbers_of
+from .parameter_text import with_shared_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -327,6 +328,8 @@ S = TypeVar("S", bound=Stage)
 def stage(name: str, *, state: type[StageState]) -> Callable[[type[S]], type[S]]:
     """Register the class of a model that the core lists under a name.
 
+    Its docstring needs no entries of creep, dynamics and mechanics: they come from the core's list.
+
     Parameters
     ----------
     name : str
@@ -342,6 +345,7 @@ def stage(name: str, *, state: type[StageState]) -> Callable[[type[S]], type[S]]
 
     def register(cls: type[S]) -> type[S]:
         cls.info, cls._state = LISTED[name], state
+        cls.__doc__ = with_shared_parameters(cls.__doc__ or "", cls.info)
         REGISTERED[name] = cls
         return cls
 

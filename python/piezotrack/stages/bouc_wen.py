@@ -45,10 +45,6 @@ class BoucWenStage(Stage):
 
     Parameters
     ----------
-    mass : float
-        m [kg], above 0.
-    damping : float
-        b [N s/m], 0 or above.
     stiffness : float
         k [N/m], above 0. The displacement depends on m/k and b/k only.
     piezo_coefficient : float
@@ -62,10 +58,6 @@ class BoucWenStage(Stage):
     exponent : float, optional
         n, from 1 to 20: the sharpness of the bend. With 1 the hysteresis is exact in closed
         form; with another it is computed in short steps.
-    creep_weights : sequence of float, optional
-        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
-    creep_times : sequence of float, optional
-        tau [s], as many: see `Stage`.
 
     Raises
     ------

@@ -27,12 +27,6 @@ class BoucWenOscillator(Stage):
 
     Parameters
     ----------
-    mass : float
-        m [kg], above 0.
-    damping : float
-        c [N s/m], 0 or above.
-    stiffness : float
-        k [N/m], above 0.
     alpha : float
         Stiffness of the hysteresis for small motions [N/m].
     beta : float
@@ -45,10 +39,6 @@ class BoucWenOscillator(Stage):
         here.
     exponent : float, optional
         nu, from 1 to 20: the sharpness of the bend.
-    creep_weights : sequence of float, optional
-        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
-    creep_times : sequence of float, optional
-        tau [s], as many: see `Stage`.
 
     Raises
     ------

@@ -53,14 +53,6 @@ class DahlStage(Stage):
 
     Parameters
     ----------
-    mass : float
-        M [kg], above 0.
-    damping : float
-        D [N s/m], 0 or above.
-    stiffness : float
-        K [N/m], above 0.
-    piezo_coefficient : float
-        T [N/V], not 0.
     a1, a2 : float
         Decay along the path [1/m] and squared spatial frequency [1/m^2], 0 or above.
     b1 : float
@@ -72,10 +64,6 @@ class DahlStage(Stage):
     up : float, optional
         Constant input of the operator. The motion depends only on the products of `up` with `b1`
         and `b0`.
-    creep_weights : sequence of float, optional
-        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
-    creep_times : sequence of float, optional
-        tau [s], as many: see `Stage`.
 
     Raises
     ------

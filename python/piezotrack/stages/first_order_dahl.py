@@ -30,24 +30,12 @@ class FirstOrderDahlStage(Stage):
 
     Parameters
     ----------
-    mass : float
-        M [kg], above 0.
-    damping : float
-        D [N s/m], 0 or above.
-    stiffness : float
-        K [N/m], above 0.
-    piezo_coefficient : float
-        T [N/V], not 0.
     rest_stiffness : float
         sigma [N/m], 0 or above: slope of the force at F = 0.
     coulomb_force : float
         Fc [N], above 0: limit of the force on a long path in one direction.
     exponent : float, optional
         i, from 0 to 20: shape of the approach to Fc; linear up to sliding for 0, exponential for 1.
-    creep_weights : sequence of float, optional
-        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
-    creep_times : sequence of float, optional
-        tau [s], as many: see `Stage`.
 
     Raises
     ------

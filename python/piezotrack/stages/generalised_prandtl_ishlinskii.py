@@ -43,15 +43,6 @@ class GeneralisedPrandtlIshlinskiiStage(Stage):
         c0 [V] and c1 [1/V], above 0, c2 and c3 [V] of the envelope of a rising drive.
     falling_scale, falling_slope, falling_shift, falling_level : float, optional
         The same for the envelope of a falling drive; by default those of a rising one.
-    creep_weights, creep_times : sequence of float, optional
-        c and tau [s] of each relaxation of the creep; 8 at most.
-    time_constant : float, optional
-        T [s] of a first-order lag.
-    frequency, damping_ratio : float, optional
-        Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
-    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
-        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
-        3 at most, each g between -1 and 1.
 
     Raises
     ------

@@ -45,14 +45,6 @@ class LuGreStage(Stage):
 
     Parameters
     ----------
-    mass : float
-        M [kg], above 0.
-    damping : float
-        D [N s/m], 0 or above.
-    stiffness : float
-        K [N/m], above 0.
-    piezo_coefficient : float
-        T [N/V], not 0.
     rest_stiffness : float
         sigma0 [N/m], above 0: stiffness of the bristles, the slope of the force where it is 0.
     micro_damping : float, optional
@@ -67,10 +59,6 @@ class LuGreStage(Stage):
         vs [m/s], above 0: the speed at which 63 % of the change from Fs to Fc is done.
     viscous_friction : float, optional
         sigma2 [N s/m], 0 or above. A record determines only its sum with the damping.
-    creep_weights : sequence of float, optional
-        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
-    creep_times : sequence of float, optional
-        tau [s], as many: see `Stage`.
 
     Raises
     ------

@@ -39,17 +39,6 @@ class MaxwellSlipStage(Stage):
     slip_displacements : sequence of float
         r_i = f_i/k_i [m], as many, 0 or above and ascending: how far an element is strained when it
         slips.
-    creep_weights : sequence of float, optional
-        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
-    creep_times : sequence of float, optional
-        tau [s].
-    time_constant : float, optional
-        T [s] of a first-order lag.
-    frequency, damping_ratio : float, optional
-        Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
-    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
-        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
-        3 at most, each g between -1 and 1.
 
     Raises
     ------

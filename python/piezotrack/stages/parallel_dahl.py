@@ -48,14 +48,6 @@ class ParallelDahlStage(Stage):
 
     Parameters
     ----------
-    mass : float
-        M [kg], above 0.
-    damping : float
-        D [N s/m], 0 or above.
-    stiffness : float
-        K [N/m], above 0.
-    piezo_coefficient : float
-        T [N/V], not 0.
     rest_stiffness_1, rest_stiffness_2, rest_stiffness_3 : float
         sigma_j [N/m], 0 or above: slope of the force of each element where it is 0.
     yield_path : float
@@ -63,10 +55,6 @@ class ParallelDahlStage(Stage):
         63 % of the way from its force to its Coulomb force is covered.
     path_ratio : float
         rho, from 1 to 1000: path of each element over that of the one before.
-    creep_weights : sequence of float, optional
-        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
-    creep_times : sequence of float, optional
-        tau [s], as many: see `Stage`.
 
     Raises
     ------

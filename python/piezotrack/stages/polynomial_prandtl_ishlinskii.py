@@ -38,15 +38,6 @@ class PolynomialPrandtlIshlinskiiStage(Stage):
         r [V], half the width of each play's backlash, 0 or above and ascending; 32 at most.
     weights : sequence of float
         w [m/V], as many, each 0 or of the sign of the polynomial's slope.
-    creep_weights, creep_times : sequence of float, optional
-        c and tau [s] of each relaxation of the creep; 8 at most.
-    time_constant : float, optional
-        T [s] of a first-order lag.
-    frequency, damping_ratio : float, optional
-        Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
-    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
-        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
-        3 at most, each g between -1 and 1.
 
     Raises
     ------

@@ -72,18 +72,6 @@ class PrandtlIshlinskiiStage(Stage):
     dead_zone_weights : sequence of float, optional
         s, change of the slope there; partial sums stay above -1. The loops of plays have point
         symmetry, dead zones make them asymmetric.
-    creep_weights : sequence of float, optional
-        c, final contribution of each relaxation of the creep as a share, 0 or above; 8 at most.
-    creep_times : sequence of float, optional
-        tau [s]. A decade apart and with equal weights they make a creep that grows with the
-        logarithm of time.
-    time_constant : float, optional
-        T [s] of a first-order lag.
-    frequency, damping_ratio : float, optional
-        Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
-    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
-        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
-        3 at most, each g between -1 and 1.
 
     Raises
     ------

@@ -68,15 +68,6 @@ class PreisachStage(Stage):
         mu [m] of the cells, n (n + 1)/2 between n + 1 levels, each 0 or of the sign of `linear`:
         mu_00, mu_10, mu_11, mu_20, ..., where mu_ij has the relays that switch up between levels i
         and i + 1 and down between levels j and j + 1.
-    creep_weights, creep_times : sequence of float, optional
-        c and tau [s] of each relaxation of the creep; 8 at most.
-    time_constant : float, optional
-        T [s] of a first-order lag.
-    frequency, damping_ratio : float, optional
-        Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
-    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
-        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
-        3 at most, each g between -1 and 1.
 
     Raises
     ------

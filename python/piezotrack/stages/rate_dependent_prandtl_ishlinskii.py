@@ -41,15 +41,6 @@ class RateDependentPrandtlIshlinskiiStage(Stage):
         by this time.
     dead_zone_thresholds, dead_zone_weights : sequence of float, optional
         d [m] and s of the one-sided dead zones; 8 at most.
-    creep_weights, creep_times : sequence of float, optional
-        c and tau [s] of each relaxation of the creep; 8 at most.
-    time_constant : float, optional
-        T [s] of a first-order lag.
-    frequency, damping_ratio : float, optional
-        Undamped frequency [Hz] and damping ratio zeta of a mode; not with `time_constant`.
-    mode_weights, mode_frequencies, mode_damping_ratios : sequence of float, optional
-        g, undamped frequency [Hz] and damping ratio of further modes in parallel with that mode;
-        3 at most, each g between -1 and 1.
 
     Raises
     ------

@@ -37,7 +37,7 @@ typedef struct {
 } piezotrack_numbers;
 
 /**
- * What a controller is made of. Units are SI: m, V, s, Hz. What is 0 or NULL has its default, so
+ * Parts of a controller, by name. Units are SI: m, V, s, Hz. What is 0 or NULL has its default, so
  * name what you set: `piezotrack_settings settings = {.dt = 0.001, .high = 75.0};`
  *
  * The feedback law is one of
@@ -126,7 +126,7 @@ typedef struct {
    */
   size_t initial_count;
   /**
-   * What the sensor shows where the stage rests without drive, m.
+   * Reading of the sensor where the stage rests without drive, m.
    */
   double offset;
   /**

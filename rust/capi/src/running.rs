@@ -11,10 +11,10 @@ use piezotrack_core::parts::{ControllerParts, Law, LawState, Named};
 use piezotrack_core::simulate::DELAY_LINE;
 use piezotrack_core::{Error, Result};
 
-/// What the model of the feedforward is called that is a network.
+/// Name of the feedforward's model that is a network.
 const NETWORK: &str = "neural network";
 
-/// What the feedforward is made of.
+/// Parts of the feedforward.
 pub struct FeedforwardParts<'a> {
     pub model: &'a str,
     pub parameters: Vec<Named<'a>>,

@@ -19,7 +19,7 @@ pub struct Numbers {
     pub count: usize,
 }
 
-/// What a controller is made of. Units are SI: m, V, s, Hz. What is 0 or NULL has its default, so
+/// Parts of a controller, by name. Units are SI: m, V, s, Hz. What is 0 or NULL has its default, so
 /// name what you set: `piezotrack_settings settings = {.dt = 0.001, .high = 75.0};`
 ///
 /// The feedback law is one of
@@ -77,7 +77,7 @@ pub struct Settings {
     pub initial: *const Numbers,
     /// How many there are.
     pub initial_count: usize,
-    /// What the sensor shows where the stage rests without drive, m.
+    /// Reading of the sensor where the stage rests without drive, m.
     pub offset: f64,
     /// Time by which the displacement lags behind the drive beyond the model, s.
     pub delay: f64,

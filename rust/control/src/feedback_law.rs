@@ -1,6 +1,6 @@
 //! The interface of a feedback law.
 
-/// What a feedback law is told of a sample: finite numbers, all of them.
+/// Input of a feedback law at a sample: finite numbers, all of them.
 ///
 /// ```
 /// use piezotrack_control::FeedbackSample;

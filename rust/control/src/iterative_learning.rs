@@ -116,7 +116,7 @@ impl<'a> IterativeLearning<'a> {
         Ok(error.iter().filter(|one| !usable(**one)).count())
     }
 
-    /// What L makes of the errors around sample `k`, V.
+    /// Correction that L makes of the errors around sample `k`, V.
     fn learnt_from(&self, error: &[f64], k: usize) -> f64 {
         let (count, half) = (error.len(), self.learning.len() / 2);
         // Tap 0 weighs the sample `half` after this one; L may be longer than the period.

@@ -1,4 +1,4 @@
-//! What can be wrong with an input: one sentence that names the argument and its value.
+//! Errors of inputs: one sentence that names the argument and its value.
 
 /// Result of anything that checks its input.
 pub type Result<T> = core::result::Result<T, Error>;
@@ -13,7 +13,7 @@ pub enum Error {
         name: String,
         /// Its value, with the unit.
         value: String,
-        /// What would have been right.
+        /// Description of a right value.
         expected: String,
     },
     /// An array has the wrong size.
@@ -35,7 +35,7 @@ pub enum Error {
     /// Memory that cannot be had.
     #[error("{what}: {} MB of memory are not to be had", bytes.div_ceil(1_000_000))]
     Memory {
-        /// What it was to hold.
+        /// Contents that it was to hold.
         what: String,
         /// Its size.
         bytes: usize,

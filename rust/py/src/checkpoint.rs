@@ -22,7 +22,7 @@ const FORMAT: &str = "piezotrack-checkpoint 1";
 /// Time between two writings.
 const INTERVAL: Duration = Duration::from_millis(500);
 
-/// What a search has computed, in a file.
+/// Answers that a search has computed, in a file.
 #[pyclass(name = "Checkpoint", frozen, module = "piezotrack._core")]
 pub struct PyCheckpoint(pub Arc<Answers>);
 
@@ -163,7 +163,7 @@ impl Answers {
     }
 }
 
-/// What the system says, without its number.
+/// Message of the system, without its number.
 fn reason(error: &io::Error) -> String {
     let text = error.to_string();
     text.split(" (os error").next().unwrap_or(&text).to_lowercase()

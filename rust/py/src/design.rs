@@ -60,7 +60,7 @@ impl PyLoopPlant {
     }
 }
 
-/// What is known of a loop, as a dict in Python.
+/// Verdict on a loop, as a dict in Python.
 #[derive(IntoPyObject)]
 struct Check {
     stable: bool,

@@ -40,7 +40,7 @@ pub fn in_metres(reference: f64) -> PyResult<f64> {
     Ok(reference)
 }
 
-/// What a displacement is in the unit that explains it.
+/// Hint that writes a displacement in the unit that explains it.
 fn hint(value: f64, span: Span) -> String {
     match meant(value, span) {
         Some((unit, _, power)) => format!("; {value} {unit} is {value}{power} m"),

@@ -143,7 +143,8 @@ impl PyInverse {
     }
 }
 
-/// What is beyond the limits does not reach the stage, and the inverse does not remember it.
+/// Voltages along a reference. A voltage beyond the limits does not reach the stage, and the inverse
+/// does not remember it.
 fn along(
     inverse: &AnyInverse,
     mut state: AnyInverseState,

@@ -54,7 +54,7 @@ struct Listed {
     title: &'static str,
     drive_unit: &'static str,
     searched: bool,
-    /// What the places of its signals are called; empty where they have none.
+    /// Name of the places of its signals; empty where they have none.
     places: &'static str,
     parameters: Vec<Parameter>,
     state: Vec<Parameter>,

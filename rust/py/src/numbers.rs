@@ -53,8 +53,8 @@ pub fn is_unsuitable(error: &PyErr, py: Python<'_>) -> bool {
         || error.is_instance_of::<PyOverflowError>(py)
 }
 
-/// What converts to a number and is hardly ever meant so: truth values, texts, arrays, and what
-/// would lose its imaginary part.
+/// Whether a value converts to a number and is hardly ever meant so: a truth value, a text, an array,
+/// or one that would lose its imaginary part.
 fn is_other(value: &Bound<'_, PyAny>) -> bool {
     if value.is_exact_instance_of::<PyFloat>() || value.is_exact_instance_of::<PyInt>() {
         return false;

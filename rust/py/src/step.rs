@@ -16,7 +16,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(turns, module)?)
 }
 
-/// What the paper's formulas make of readings.
+/// Results of the paper's formulas for readings.
 #[pyclass(name = "Conventional", frozen, module = "piezotrack._core")]
 struct PyConventional(Conventional);
 

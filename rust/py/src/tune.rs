@@ -288,8 +288,8 @@ impl Goal {
             sensitivity,
             learning,
             slew: self.slew,
-            clipped: self.largest_saturation,
-            error: self.largest_error,
+            largest_saturation: self.largest_saturation,
+            largest_error: self.largest_error,
         }
     }
 }

@@ -1,4 +1,4 @@
-"""What goes over the line: commands, answers of one or more lines, errors, arrays of data."""
+"""Protocol of the line: commands, answers of one or more lines, errors, arrays of data."""
 
 from __future__ import annotations
 

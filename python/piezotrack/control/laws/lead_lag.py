@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from ..._support.arguments import finite, not_negative
-from ...errors import ParameterError
+from ..._support.arguments import finite, not_negative, one_of
 from ..parts.part import FeedbackLaw, part
 
 __all__ = ["LeadLag"]
@@ -56,5 +55,4 @@ class LeadLag(FeedbackLaw):
         finite("kp", self.kp, "V/m")
         not_negative("lead", self.lead, "s")
         not_negative("lag", self.lag, "s")
-        if self.method not in ("tustin", "matched"):
-            raise ParameterError(f"method is {self.method!r}: expected 'tustin' or 'matched'")
+        one_of("method", self.method, ("tustin", "matched"))

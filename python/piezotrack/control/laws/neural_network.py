@@ -312,7 +312,7 @@ class _Network:
 
     @property
     def numbers(self) -> Numbers:
-        """What the core takes."""
+        """Numbers that the core takes."""
         hidden, biases, outputs, direct = self.split(self.weights)
         one, two, three = self.scales.tolist()
         return (

@@ -1,4 +1,4 @@
-"""What a search for gains may change, and in which ranges."""
+"""Settings that a search for gains may change, and their ranges."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ class Source:
 
     @property
     def ending(self) -> str:
-        """What the name ends with, in small letters and with its dot."""
+        """Ending of the name, in small letters and with its dot."""
         return self.path.suffix.lower()
 
     def content(self) -> bytes:

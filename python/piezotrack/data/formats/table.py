@@ -1,4 +1,4 @@
-"""What every format gives: named columns with the units and the interval that the file states."""
+"""Table that every format gives: named columns with the file's units and interval."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ from ..._support.arguments import expect, has_entries, one_of
 from ..._support.files import (
     make_folder,
     picture_files,
+    result_set,
     save_figures,
-    together,
     write_document,
 )
 from ..._support.result import Result
@@ -193,7 +193,7 @@ class Comparison(Result):
         DataError
             The folder cannot be made or written to.
         """
-        with together(make_folder(folder)) as path:
+        with result_set(make_folder(folder)) as path:
             return [
                 write_document(path / "comparison.json", self.document()),
                 *(row.fit.save(path / f"{row.name}.json") for row in self.rows),

@@ -11,7 +11,7 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import expect
 from ..._support.arrays import real_array
-from ..._support.files import make_folder, save_figures, together, write_document
+from ..._support.files import make_folder, result_set, save_figures, write_document
 from ..._support.result import Result
 from ..._support.statistics import ErrorStatistics
 from ...data.dataset import Dataset
@@ -197,7 +197,7 @@ class Noise(Result):
         DataError
             The folder cannot be made or written to.
         """
-        with together(make_folder(folder)) as path:
+        with result_set(make_folder(folder)) as path:
             return [
                 write_document(path / "noise.json", self.document()),
                 *save_figures({"noise": self.plot()}, path),

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ... import _core
-from ..._support.files import make_folder, save_figures, together, write_document
+from ..._support.files import make_folder, result_set, save_figures, write_document
 from ..._support.messages import quoted
 from ..._support.result import Result
 from ...data.dataset import Dataset
@@ -368,7 +368,7 @@ class StepResult(Result):
             The folder cannot be made or written to.
         """
         figures = {} if self.trace is None else {"step": self.plot()}
-        with together(make_folder(folder)) as path:
+        with result_set(make_folder(folder)) as path:
             return [
                 write_document(path / "step.json", self.document()),
                 *save_figures(figures, path),

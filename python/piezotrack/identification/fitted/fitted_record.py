@@ -1,4 +1,4 @@
-"""What each of the records of an identification has of its own, in a result and in a file."""
+"""Quantities of each of the records of an identification alone, in a result and in a file."""
 
 from __future__ import annotations
 

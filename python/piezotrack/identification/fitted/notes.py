@@ -1,4 +1,4 @@
-"""What a fit says of its record: where it begins, its lag, and where the model was not fitted."""
+"""Notes of a fit on its record: where it begins, its lag, and where the model was not fitted."""
 
 from __future__ import annotations
 

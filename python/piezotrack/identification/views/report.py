@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..._support.files import make_folder, picture_files, save_figures, together
+from ..._support.files import make_folder, picture_files, result_set, save_figures
 from ..._support.units import of_drive, shown_unit
 from ..fitted.notes import start_notes
 
@@ -405,5 +405,5 @@ def save_identification(
         figures[f"{name}_time{_nth(i)}"] = above.figure
     if fit.model.info.searched:
         figures[f"{name}_convergence"] = plot_convergence(fit, title=named(fit, fit.data)).figure
-    with together(make_folder(folder)) as path:
+    with result_set(make_folder(folder)) as path:
         return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]

@@ -6,7 +6,7 @@ from itertools import pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from ..._support.files import make_folder, replacing, together, write_document
+from ..._support.files import make_folder, replacing, result_set, write_document
 from ..._support.plot_style import without_glyph_warnings
 from ..reproduction import REPORT
 from .figures import Drawn, drawn
@@ -32,7 +32,7 @@ def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Pat
 
     figures = drawn(found.experiments, found.drives)
     try:
-        with together(make_folder(folder)) as path, without_glyph_warnings():
+        with result_set(make_folder(folder)) as path, without_glyph_warnings():
             page = html_text(found, figures)
             written = [path / name for name in REPORT]
             with replacing(written[0]) as temporary:

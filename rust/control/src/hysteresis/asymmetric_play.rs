@@ -51,7 +51,7 @@ impl<const PLAYS: usize> PlayFamily<PLAYS> {
     }
 }
 
-/// What the plays of a family follow.
+/// Curve that the plays of a family follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bend {
     /// The input.

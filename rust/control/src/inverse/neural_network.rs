@@ -86,7 +86,7 @@ pub struct NeuralNetworkInverse {
     offset: f64,
 }
 
-/// What a [`NeuralNetworkInverse`] remembers: the outputs of its plays.
+/// State of a [`NeuralNetworkInverse`]: the outputs of its plays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NeuralNetworkState {
     plays: [f64; MOST_NETWORK_PLAYS],

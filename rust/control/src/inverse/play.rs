@@ -100,7 +100,7 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
         self.plays.follow(state, self.before_dead_zones(output))
     }
 
-    /// What goes into the dead zones where `output` comes out of them: the weighted sum of the
+    /// Input of the dead zones where `output` comes out of them: the weighted sum of the
     /// plays.
     #[must_use]
     #[inline]

@@ -5,7 +5,7 @@ use crate::snapshot::Snapshot;
 /// Clipped samples in a period, as its part, above which learning stops as a whole.
 const PART: u32 = 4;
 
-/// What came of the command of the sample before: what a repetitive part learns from.
+/// Outcome of the command of the sample before: a repetitive part learns from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outcome {
     /// Its tracking error, m.
@@ -14,7 +14,7 @@ pub struct Outcome {
     pub excess: f64,
 }
 
-/// What the repetitive part does in a sample.
+/// Action of the repetitive part in a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Learning {
     /// It learns.

@@ -19,7 +19,7 @@ const SLOWEST: f64 = 1e-6;
 /// The longest delay line, in samples, whose roots [`SampledLoop::check`] counts.
 const EXACT: usize = 10_000;
 
-/// What is known about the closed loop of a plant and a controller.
+/// Stability and margins of the closed loop of a plant and a controller, as far as they are known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     /// Whether it is stable, hidden roots aside.
@@ -50,7 +50,7 @@ pub struct Verdict {
     pub small_gain: Option<f64>,
     /// Margins of the feedback without the repetitive part.
     pub margins: Margins,
-    /// What may be wrong with the settings, in a sentence.
+    /// Possible fault of the settings, in a sentence.
     pub hint: Option<String>,
 }
 
@@ -143,7 +143,7 @@ impl SampledLoop {
         Some(peak.refine(size).height)
     }
 
-    /// What may be wrong with the gain of a feedback whose stable range is known.
+    /// Describe a possible fault of the gain of a feedback whose stable range is known.
     fn hint(&self, gains: Option<GainRange>) -> Option<String> {
         let gain = self.named_gain()?;
         if gain == 0.0 {

@@ -21,13 +21,13 @@ use crate::signal::{FractionalDelay, Stop};
 /// An identified stage and how it was found.
 #[derive(Clone, Debug)]
 pub struct Identification {
-    /// What was held, what was free, and between which bounds; of several records, for the first.
+    /// Parameters held and free, and the bounds of these; of several records, for the first.
     pub problem: Problem,
     /// How finely the search stepped through the first record.
     pub stepping: Stepping,
-    /// What each record has of its own in the best run, in their order; empty where there is none.
+    /// Quantities of each record alone in the best run, in their order; empty where there is none.
     pub records: Vec<OwnResult>,
-    /// What each run found, in their order.
+    /// Outcome of each run, in their order.
     pub runs: Vec<Outcome>,
     /// Which of the runs has the lowest cost; `None` where the search was stopped before its
     /// first cost.
@@ -41,10 +41,10 @@ pub struct Identification {
     pub sensitivities: Vec<Sensitivity>,
 }
 
-/// What one of the records has in the best run.
+/// Quantities of one of the records in the best run.
 #[derive(Clone, Debug)]
 pub struct OwnResult {
-    /// What was held and free, with its own delay, voltage before and drift.
+    /// Parameters held and free, with its own delay, voltage before and drift.
     pub problem: Problem,
     /// The parameters, and what [`super::parameters::candidate::ITS_OWN`] has.
     pub theta: Theta,
@@ -155,7 +155,7 @@ fn agreeing_with(runs: &[Outcome], records: &Records<'_>) -> usize {
     runs.iter().filter(|run| run.costs.rms <= near).count()
 }
 
-/// What the record tells of the best candidate.
+/// Information of the record on the best candidate.
 #[derive(Default)]
 struct Told {
     lags: Option<LagRange>,

@@ -34,7 +34,7 @@ pub struct Spec {
     pub delay: Delay,
     /// Drift of the sensor along the record.
     pub drift: DriftKind,
-    /// What the stage went through before the record.
+    /// Motion of the stage before the record.
     pub history: History,
     /// Time constants of the creep whose shares are fitted, s; none for no creep.
     pub creep_times: Vec<f64>,
@@ -97,7 +97,7 @@ pub struct Problem {
     pub scale_assumed: bool,
     /// Whether an offset is fitted.
     pub offset: bool,
-    /// What the stage went through before the record.
+    /// Motion of the stage before the record.
     pub history: History,
     /// Whether the drive is so slow that any lag is as likely as another that fits: the least is
     /// taken.

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-/// What `each` makes of every part, in their order.
+/// Results of `each` for every part, in their order.
 ///
 /// What spreads the work over threads is compiled once, not for every type of parts and results.
 pub(crate) fn on_all_threads<A: Sync, T: Send>(

@@ -16,7 +16,7 @@ pub const OTHERS: &[&PartInfo] = &[&REPETITIVE, &LAG, &ZERO_PHASE, &LOW_PASS, &N
 /// A part by its name, with its numbers.
 pub type Named<'a> = (&'a str, &'a [f64]);
 
-/// What a controller is made of.
+/// Parts of a controller.
 #[derive(Clone, Debug)]
 pub struct ControllerParts<'a> {
     /// Sampling interval, s.

@@ -85,7 +85,7 @@ impl PartInfo {
     }
 }
 
-/// What a number of a part is.
+/// Form of a number of a part.
 #[derive(Clone, Copy, Debug)]
 pub enum Form {
     /// A number; infinity too, where the part takes it.
@@ -145,7 +145,7 @@ pub struct NumberInfo {
     pub symbol: &'static str,
     /// SI unit for a drive in volts, empty where there is none.
     pub unit: &'static str,
-    /// What it is.
+    /// Form of the number.
     pub form: Form,
     /// Value where the caller gives none.
     pub default: Option<f64>,
@@ -160,7 +160,7 @@ impl NumberInfo {
         Self { name, symbol, unit, form: Form::Number, default: None, is_optional: false }
     }
 
-    /// What is no single number.
+    /// Describe an entry that is no single number.
     #[must_use]
     pub const fn of(name: &'static str, form: Form) -> Self {
         Self { form, ..Self::new(name, "", "") }

@@ -8,7 +8,7 @@ pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 /// Never gives up.
 pub const NEVER: Stop<'static> = &|| false;
 
-/// What the drive does between two samples.
+/// Course of the drive between two samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hold {
     /// First order: a straight line from sample to sample.
@@ -24,7 +24,7 @@ pub struct Drive<'a> {
     pub u: &'a [f64],
     /// Sampling interval, s.
     pub dt: f64,
-    /// What happens between the samples.
+    /// Course between the samples.
     pub hold: Hold,
 }
 

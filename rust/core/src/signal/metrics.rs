@@ -141,7 +141,7 @@ pub fn each_period(desired: &[f64], actual: &[f64], dt: f64, period: f64) -> Res
     Ok(out)
 }
 
-/// What a model leaves of a record that it was fitted to by least squares.
+/// Residual of a model on a record that it was fitted to by least squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residual {
     /// Root of the mean square, m.

@@ -27,7 +27,7 @@ pub struct Amplifier {
     pub high: f64,
 }
 
-/// What the length of a step decides of an amplifier.
+/// Coefficients of an amplifier that depend on the length of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct AmplifierFlow {
     /// exp(-step / tau).

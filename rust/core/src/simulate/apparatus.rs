@@ -14,11 +14,11 @@ use crate::signal::{Stop, index};
 /// A plant between its amplifier and its sensor.
 #[derive(Clone, Copy, Debug)]
 pub struct Apparatus<'a, P> {
-    /// What is moved.
+    /// Plant that is moved.
     pub plant: &'a P,
-    /// What turns the command into the applied voltage.
+    /// Amplifier that turns the command into the applied voltage.
     pub amplifier: Amplifier,
-    /// What reads the displacement.
+    /// Sensor that reads the displacement.
     pub sensor: Sensor,
     /// Longest step of the simulation, s.
     pub step: f64,

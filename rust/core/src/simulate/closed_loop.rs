@@ -33,7 +33,7 @@ struct Part<F> {
     stretch: Stretch<F>,
     /// Where it begins, as a part of the interval.
     from: f64,
-    /// What happens at its end.
+    /// Event at its end.
     event: Event,
 }
 

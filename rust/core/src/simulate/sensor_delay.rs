@@ -1,4 +1,4 @@
-//! What sensors with a delay see while stages are driven: displacements of earlier instants.
+//! Displacements of earlier instants, which sensors with a delay see while stages are driven.
 
 use super::timing::{Delay, SAME};
 use crate::error::Result;
@@ -12,7 +12,7 @@ pub(super) struct Looks<const AXES: usize> {
     place: [usize; AXES],
     /// Whole intervals from there to its reading.
     whole: [usize; AXES],
-    /// What each has seen, interval by interval, m.
+    /// Displacements that each has seen, interval by interval, m.
     seen: [Vec<f64>; AXES],
 }
 
@@ -54,7 +54,7 @@ impl<const AXES: usize> Looks<AXES> {
         self.seen[axis].push(displacement);
     }
 
-    /// What a sensor reads at sample `k`, m; before it has seen anything the start.
+    /// Displacement that a sensor reads at sample `k`, m; before it has seen anything the start.
     pub(super) fn read_at(&self, axis: usize, k: usize) -> f64 {
         self.seen[axis][k.saturating_sub(self.whole[axis])]
     }

@@ -161,7 +161,7 @@ impl Clock {
 /// Commands of one controller in their order, and when each takes effect.
 pub(super) struct Commands {
     issued: Vec<f64>,
-    /// What the amplifier follows before the first.
+    /// Command that the amplifier follows before the first.
     held: f64,
     /// From the control interval that a command is for to its effect, without jitter.
     delay: Delay,
@@ -232,7 +232,7 @@ impl Commands {
 /// Most samples in a control interval: that of x, that of y for the record, that of y's controller.
 pub(super) const SAMPLES: usize = 3;
 
-/// What happens at the end of a part of a control interval.
+/// Event at the end of a part of a control interval.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Event {
     /// Where it is, as a part of the interval.

@@ -10,10 +10,10 @@ use crate::math::{room, zeros};
 use crate::models::Plant;
 use crate::signal::Stop;
 
-/// What an error calls the memory of the repetitive part.
+/// Name of the memory of the repetitive part in errors.
 pub const DELAY_LINE: &str = "the delay line of the repetitive control";
 
-/// What a controller is to follow, sample by sample.
+/// Reference that a controller is to follow, sample by sample.
 #[derive(Clone, Copy, Debug)]
 pub struct ReferenceSamples<'a> {
     /// Reference, m.

@@ -40,7 +40,7 @@ pub struct TwoAxes<'a, X, Y> {
     pub x: Apparatus<'a, X>,
     /// The axis that is served second.
     pub y: Apparatus<'a, Y>,
-    /// What of y shows in x, and what of x shows in y.
+    /// Share of y that shows in x, and share of x that shows in y.
     pub cross_talk: [f64; 2],
     /// Time from the sampling of x to that of y, s; it may be more than an interval.
     pub lag: f64,
@@ -79,7 +79,7 @@ impl<X: Plant, Y: Plant> TwoAxes<'_, X, Y> {
         self.missed.validate()
     }
 
-    /// What cross-talk adds to each axis, m.
+    /// Displacement that cross-talk adds to each axis, m.
     #[inline]
     fn added(&self, x: &ApparatusState<X::State>, y: &ApparatusState<Y::State>) -> [f64; 2] {
         let [xy, yx] = self.cross_talk;
@@ -100,7 +100,7 @@ impl<X: Plant, Y: Plant> TwoAxes<'_, X, Y> {
         [self.x.displacement(x) + to_x, self.y.displacement(y) + to_y]
     }
 
-    /// What each sensor sees, before its zero, m.
+    /// Displacement that each sensor sees, before its zero, m.
     fn seen(&self, x: &ApparatusState<X::State>, y: &ApparatusState<Y::State>) -> [f64; 2] {
         let [to_x, to_y] = self.added(x, y);
         let (own_x, own_y) =
@@ -133,7 +133,7 @@ struct Part<X, Y> {
     y: Stretch<Y>,
     /// Where it begins, as a part of the interval.
     from: f64,
-    /// What happens at its end.
+    /// Event at its end.
     event: Event,
 }
 

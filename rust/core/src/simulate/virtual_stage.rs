@@ -48,13 +48,13 @@ pub struct Preconditioning {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct VirtualStage {
-    /// What is moved.
+    /// Stage that is moved.
     pub stage: Stage,
     /// Amplifier between command and stage.
     pub amplifier: Amplifier,
     /// Sensor, with the seed of its noise.
     pub sensor: Sensor,
-    /// What comes before an experiment; without it the stage has never moved.
+    /// Cycles before an experiment; without them the stage has never moved.
     pub preconditioning: Option<Preconditioning>,
     /// Longest step of the simulation, s.
     pub step: f64,

@@ -1,6 +1,6 @@
-//! What is read of a closed loop while it runs.
+//! Figures that are read of a closed loop while it runs.
 
-/// What is read of a closed loop.
+/// Figures of a closed loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Figures {
     /// Tracking error, m rms.

@@ -1,4 +1,4 @@
-//! What a search judges controllers by.
+//! Judgement of controllers by a search.
 
 use piezotrack_control::Controller;
 

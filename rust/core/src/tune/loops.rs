@@ -39,7 +39,7 @@ pub struct Task<'a> {
     pub timing: Timing,
     /// Reference and feedforward.
     pub samples: ReferenceSamples<'a>,
-    /// What other axes add to the displacement at each sample, m; empty for nothing.
+    /// Displacement that other axes add at each sample, m; empty for nothing.
     pub beside: &'a [f64],
     /// Part of the control interval at which its motion is shown to what judges it beside other axes,
     /// 0 to below 1; the figures of this axis are always of its samples.
@@ -82,7 +82,7 @@ impl<'a> Task<'a> {
         Ok(ReadyTask { task: self, start, noise })
     }
 
-    /// What other axes add at sample `k`, m.
+    /// Displacement that other axes add at sample `k`, m.
     #[inline(always)]
     fn beside(&self, k: usize) -> f64 {
         self.beside.get(k).copied().unwrap_or(0.0)

@@ -1,4 +1,4 @@
-//! What a loop has to keep for every plant of a set, read off a grid of frequencies.
+//! Requirements that a loop keeps for every plant of a set, read off a grid of frequencies.
 //!
 //! For a search: thousands of controllers against the same plants, whose responses are computed
 //! once. The grid is fine where a plant turns fast; what it says of the best controller is checked
@@ -13,7 +13,7 @@ use crate::error::{Error, Result, positive};
 use crate::math::{C, Jet, Ratio};
 use crate::parts::Law;
 
-/// What every loop of a set keeps.
+/// Requirements that every loop of a set keeps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Requirements {
     /// Least gain margin, a factor above 1.
@@ -27,9 +27,9 @@ pub struct Requirements {
     /// Fastest change of the command, V/s; infinite for any.
     pub slew: f64,
     /// Largest share of samples at which the command is clipped.
-    pub clipped: f64,
+    pub largest_saturation: f64,
     /// Largest rms error over all motions, m; infinite for any.
-    pub error: f64,
+    pub largest_error: f64,
 }
 
 impl Requirements {
@@ -54,13 +54,13 @@ impl Requirements {
             let found = format!("{} V/s", self.slew);
             return Err(Error::parameter("slew", found, "above 0, or infinity"));
         }
-        if self.error.is_nan() || self.error <= 0.0 {
-            let found = format!("{} m", self.error);
+        if self.largest_error.is_nan() || self.largest_error <= 0.0 {
+            let found = format!("{} m", self.largest_error);
             return Err(Error::parameter("largest_error", found, "above 0, or infinity"));
         }
-        if !(0.0..=1.0).contains(&self.clipped) {
+        if !(0.0..=1.0).contains(&self.largest_saturation) {
             let expected = "a share, 0 to 1";
-            return Err(Error::parameter("largest_saturation", self.clipped, expected));
+            return Err(Error::parameter("largest_saturation", self.largest_saturation, expected));
         }
         positive("learning", self.learning, "").map(drop)
     }
@@ -75,7 +75,7 @@ pub struct Worst {
     pub plant: usize,
 }
 
-/// What is least good over a set of plants.
+/// Worst margins over a set of plants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Robustness {
     /// Roots outside of the unit circle, of the plant that has most of them.
@@ -201,7 +201,7 @@ impl PlantSet {
         self.dt
     }
 
-    /// What is least good of a controller over the set.
+    /// Worst margins of a controller over the set.
     #[must_use]
     pub fn robustness(&self, controller: &Controller<Law>) -> Robustness {
         let [above, below] = controller.feedback.transfer_function();

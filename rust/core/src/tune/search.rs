@@ -17,7 +17,7 @@ use crate::identify::{Swarm, SwarmSettings};
 use crate::parts::Law;
 use crate::signal::{Stop, index};
 
-/// What is made small.
+/// Quantity that is made small.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aim {
     /// The error, m rms over all tasks.
@@ -35,9 +35,9 @@ pub enum Aim {
 /// The controller of an axis, of which settings are sought.
 #[derive(Clone, Debug)]
 pub struct SoughtController {
-    /// What is sought in which range.
+    /// Settings that are sought, and their ranges.
     pub sought: Vec<Sought>,
-    /// What they are settings of.
+    /// Controller of which they are settings.
     pub template: Template,
     /// Plants for which it keeps what is required.
     pub plants: PlantSet,
@@ -50,9 +50,9 @@ pub struct Tuning<'a> {
     pub axes: Vec<SoughtController>,
     /// Motions that the controllers are judged by.
     pub tasks: Vec<Judge<'a>>,
-    /// What that is.
+    /// Requirements on every loop.
     pub required: Requirements,
-    /// What is made small.
+    /// Quantity that is made small.
     pub aim: Aim,
     /// Error that a volt (rms) of change from sample to sample is worth, m/V.
     pub effort: f64,
@@ -74,7 +74,7 @@ pub struct Found {
     pub settings: Vec<Settings>,
     /// The controllers with them.
     pub controllers: Vec<Controller<Law>>,
-    /// What they keep over the plants, which are numbered through all axes.
+    /// Margins that they keep over the plants, which are numbered through all axes.
     pub robustness: Robustness,
     /// Their figures in each task; empty where they do not keep the margins.
     pub figures: Vec<Figures>,
@@ -103,8 +103,8 @@ struct Tried {
 }
 
 impl Tried {
-    /// What the swarm makes small: any that keeps what is required before any that does not, and
-    /// one that keeps the margins before one that does not.
+    /// Rank that the swarm makes small: any that keeps what is required comes before any that does
+    /// not, and one that keeps the margins before one that does not.
     fn rank(&self) -> f64 {
         match (self.excess <= 1.0, self.figures.is_empty()) {
             (true, _) => self.cost,
@@ -259,7 +259,7 @@ impl Tuning<'_> {
         Tried { settings, controllers, robustness, figures: Vec::new(), excess, cost }
     }
 
-    /// What is least good over the plants of all axes.
+    /// Worst margins over the plants of all axes.
     fn robustness(&self, controllers: &[Controller<Law>]) -> Option<Robustness> {
         let mut before = 0;
         let mut all = None;
@@ -286,10 +286,10 @@ impl Tuning<'_> {
         let weighs = self.effort > 0.0 && self.aim != Aim::Effort;
         let changes = if weighs { self.effort * mean(|one| one.effort) } else { 0.0 };
         let mut excess = excess.max(most(|one| one.slew) / self.required.slew);
-        excess = excess.max(mean(|one| one.rms) / self.required.error);
+        excess = excess.max(mean(|one| one.rms) / self.required.largest_error);
         let clipped = most(|one| one.clipped);
-        if clipped > self.required.clipped {
-            excess = excess.max(1.0 + clipped - self.required.clipped);
+        if clipped > self.required.largest_saturation {
+            excess = excess.max(1.0 + clipped - self.required.largest_saturation);
         }
         let cost = error + changes;
         if cost.is_finite() { (cost, excess) } else { (f64::INFINITY, f64::INFINITY) }

@@ -112,7 +112,7 @@ impl Setting {
 /// A setting with the range in which it is sought.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sought {
-    /// What is sought.
+    /// Setting that is sought.
     pub setting: Setting,
     /// Least value.
     pub low: f64,

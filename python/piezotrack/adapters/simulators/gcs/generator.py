@@ -19,7 +19,7 @@ __all__ = ["Generator", "Recorder", "Samples"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
-    """What happened at some servo cycles, all in the units of the controller (V, um)."""
+    """Samples of some servo cycles, all in the units of the controller (V, um)."""
 
     cycles: NDArray[np.int64]
     target: Array

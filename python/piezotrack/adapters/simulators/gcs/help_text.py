@@ -1,4 +1,4 @@
-"""What HLP?, HDR? and HPA? of a virtual controller answer with."""
+"""Answers of a virtual controller to HLP?, HDR? and HPA?."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ impl<'a> Evaluator<'a> {
         self.residuals.record
     }
 
-    /// What is searched on it.
+    /// Search problem of the record.
     #[must_use]
     pub fn problem(&self) -> &'a Problem {
         self.problem
@@ -171,7 +171,7 @@ impl<'a> Evaluator<'a> {
         self.residuals.costs(sums, Some(shares), self.record().window.len(), false)
     }
 
-    /// What sums over the whole window say of the shares of the creep.
+    /// Cost, and shares of the creep, from sums over the whole window.
     pub(in crate::identify) fn share_cost(&self, sums: &ShareSums) -> ShareCost {
         sums.cost(self.record().window.len(), self.problem.offset)
     }

@@ -1,4 +1,4 @@
-//! What a search has computed, kept so that it can go on after an interruption.
+//! Journal of the answers a search has computed, kept so that it can go on after an interruption.
 //!
 //! A search asks the simulations for costs and for normal equations; what it does between two
 //! questions follows from the answers and the seed. A search that is given the answers of an

@@ -30,7 +30,7 @@ pub struct Costs {
 }
 
 impl Costs {
-    /// What a candidate costs that could not be simulated.
+    /// Cost of a candidate that could not be simulated.
     pub(in crate::identify) const FAILED: Self =
         Self { rms: f64::INFINITY, offset: 0.0, drift: 0.0, shares: [0.0; MOST_SHARES] };
 }
@@ -133,7 +133,7 @@ struct Relaxing<N, R> {
     lag: CubicLag,
     reached: N,
     reading: R,
-    /// What is read at the present sample, from the centre.
+    /// Reading at the present sample, from the centre.
     output: N,
     sum: N,
     cross: N,
@@ -160,7 +160,7 @@ pub(in crate::identify) struct ResidualSums<'a, const V: usize, S: Simd, R> {
     stride: usize,
     /// The sample that is kept next.
     next: usize,
-    /// What was kept: at each of these samples the displacement, and the creep's outputs.
+    /// Kept readings: at each of these samples the displacement, and the creep's outputs.
     kept: Vec<Lanes<S, V>>,
 }
 
@@ -170,10 +170,10 @@ pub(in crate::identify) struct Simulated {
     pub costs: Costs,
     /// Sums over the whole window; `None` where it was not simulated to its end.
     pub sums: Option<ShareSums>,
-    /// What is read at the samples that were asked for, without offset and drift, m: with the creep where the
+    /// Readings at the requested samples, without offset and drift, m: with the creep where the
     /// candidate has its shares given, else of the mechanics alone.
     pub reading: Vec<f64>,
-    /// What is read there of each relaxation of the creep, where no shares are given, m.
+    /// Readings there of each relaxation of the creep, where no shares are given, m.
     pub outputs: Vec<Vec<f64>>,
 }
 
@@ -281,7 +281,7 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
         stop() || self.verdicts.iter().all(Option::is_some)
     }
 
-    /// What was kept, a column for each candidate: of the displacement, then of each output.
+    /// Kept readings, a column for each candidate: of the displacement, then of each output.
     fn columns(&self) -> Vec<Vec<f64>> {
         let (entries, lanes) = (1 + self.creep.len(), self.candidates.len());
         let rows = self.kept.len() / entries;
@@ -418,7 +418,7 @@ pub(in crate::identify) struct Delayed<const V: usize, S: Simd> {
     past: Vec<[Lanes<S, V>; 2]>,
     /// Delay of each lane in whole samples.
     whole: Vec<usize>,
-    /// What [`FractionalDelay::part`] says.
+    /// Part that [`FractionalDelay::part`] returns.
     part: Lanes<S, V>,
     /// Sub-steps in a sampling interval.
     substeps: f64,

@@ -193,7 +193,7 @@ impl<'a> Records<'a> {
         costs.collect()
     }
 
-    /// What each record has at a place: its parameters, and cost and offset without priors; `whole`
+    /// Parameters of each record at a place, with its cost and offset without priors; `whole`
     /// is the cost of all.
     pub(in crate::identify) fn each(&self, place: &[f64], whole: Costs) -> Vec<(Theta, Costs)> {
         if let [one] = &self.members[..] {
@@ -212,7 +212,7 @@ impl<'a> Records<'a> {
     }
 }
 
-/// What the records simulated so far say of a point together.
+/// Sums at a point over the records simulated so far.
 #[derive(Clone, Copy)]
 struct Together {
     /// Their part of the mean square of all, with the shares of the creep that suit them best, m^2.

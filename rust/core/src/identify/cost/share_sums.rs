@@ -1,4 +1,4 @@
-//! What sums over a record say of the shares of its creep, about the best offset and drift.
+//! Sums over a record, for the shares of its creep, about the best offset and drift.
 
 use crate::identify::parameters::drift::DriftSums;
 use crate::identify::records::creep_shares::{LEAST_PIVOT, MOST_CREEP, MOST_SHARES, Shares};
@@ -43,8 +43,8 @@ struct Covariances {
 const FLAT: f64 = 1e-6;
 
 impl ShareSums {
-    /// What they say of the shares over so many samples, with a free offset or none, and with the
-    /// drift that suits them best.
+    /// Cost over so many samples as a function of the shares, with a free offset or none, and with
+    /// the drift that suits them best.
     pub fn cost(&self, samples: usize, offset: bool) -> ShareCost {
         let n = index(samples);
         let [mean, mut square] = self.deviation.map(|sum| sum / n);

@@ -21,7 +21,7 @@ use crate::signal::Stop;
 /// Part of a step at which the displacement is compared with its tangent.
 const PART: f64 = 0.1;
 
-/// What is known of the surroundings of a place.
+/// Derivatives and residuals around a place, as far as they are known.
 pub(in crate::identify) struct Neighbourhood {
     /// Of each record.
     pub blocks: Vec<Block>,

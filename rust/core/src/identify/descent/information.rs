@@ -1,4 +1,4 @@
-//! What priors, ties and inequalities make of the normal equations of a candidate.
+//! Terms of priors, ties and inequalities in the normal equations of a candidate.
 
 use nalgebra::{DMatrix, DVector};
 

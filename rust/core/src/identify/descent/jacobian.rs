@@ -106,7 +106,7 @@ impl Evaluator<'_> {
         Candidate { shares: Some(shares), ..self.at(place) }
     }
 
-    /// What is read at a place, simulated with its creep apart, and what is left of the record.
+    /// Reading at a place, simulated with its creep apart, and the residual of the record.
     fn base(&self, (at, found): (&Candidate, Simulated), shares: &Shares, stride: usize) -> Base {
         let Simulated { reading: mut read, outputs, .. } = found;
         add_creep(&mut read, &outputs, shares);
@@ -119,7 +119,7 @@ impl Evaluator<'_> {
         Base { stride, read, outputs, residual, level, drift }
     }
 
-    /// What is read beside a place: with the drift that suits the place, and its own time constant.
+    /// Reading beside a place: with the drift that suits the place, and its own time constant.
     fn read_beside(&self, base: &Base, theta: &Theta, mut reading: Vec<f64>) -> Vec<f64> {
         self.change_drift(&mut reading, base.drift, theta.drift_time(), base.stride);
         reading
@@ -148,7 +148,7 @@ impl Evaluator<'_> {
         Fading::new(time, self.record().drive.dt, samples).shape(samples, stride)
     }
 
-    /// What the sensor adds to a displacement: an offset, and a drift with this time constant.
+    /// Level that the sensor adds to a displacement: offset, and drift with this time constant.
     fn level(&self, time: Option<f64>, stride: usize) -> Level {
         let offset = self.problem().offset;
         let drift = time.map(|time| {
@@ -180,9 +180,9 @@ struct Base {
     /// Samples of the window to a row.
     stride: usize,
     read: Vec<f64>,
-    /// What is read of each relaxation of the creep.
+    /// Reading of each relaxation of the creep.
     outputs: Vec<Vec<f64>>,
-    /// What is left of the record.
+    /// Residual of the record.
     residual: Vec<f64>,
     level: Level,
     /// The drift that suits the place best.
@@ -218,7 +218,7 @@ impl Base {
     }
 }
 
-/// What a sensor adds to a displacement, of the size that suits best.
+/// Level that a sensor adds to a displacement, of the size that suits best.
 struct Level {
     /// Whether an offset is fitted; with a drift always.
     offset: bool,

@@ -35,7 +35,7 @@ pub struct Polished {
     pub evaluations: usize,
 }
 
-/// What the data tell of one free parameter.
+/// Sensitivity of the data to one free parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensitivity {
     /// Which of several records it belongs to, where each has its own; 0 for what they share.

@@ -82,13 +82,14 @@ impl Answer for Option<Normal> {
     }
 }
 
-/// What one record adds to them, in its own coordinates and after them the directions of the shares.
+/// Block that one record adds to them, in its own coordinates and after them the directions of the
+/// shares.
 pub(in crate::identify) struct Block {
     pub square: DMatrix<f64>,
     pub slope: DVector<f64>,
     /// The Jacobian, column by column, less what offset and drift can take of it.
     pub columns: Vec<Vec<f64>>,
-    /// What is read at the place, without drift.
+    /// Reading at the place, without drift.
     pub read: Vec<f64>,
     /// The drift that suits the place best.
     pub drift: Option<Drift>,

@@ -241,7 +241,7 @@ struct Jump {
 /// A step response as read off a record.
 #[derive(Clone, Debug)]
 pub struct StepResponse {
-    /// What the formulas take.
+    /// Readings that the formulas take.
     pub readings: StepReadings,
     /// Times of the peaks, s from the first sample.
     pub peak_times: Vec<f64>,

@@ -7,7 +7,7 @@ use crate::signal::index;
 const SMALLEST: f64 = 0.02;
 /// Nor are those below so many times the noise.
 const ABOVE_NOISE: f64 = 5.0;
-/// What comes later than so many time constants is not read.
+/// Number of time constants after which nothing is read.
 const LATEST: f64 = 12.0;
 /// Nor what comes later than so many periods.
 const MOST_PERIODS: f64 = 1000.0;

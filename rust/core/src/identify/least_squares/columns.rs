@@ -1,4 +1,4 @@
-//! What each unknown of the stage does to its displacement, sample by sample.
+//! Effect of each unknown of the stage on its displacement, sample by sample.
 //!
 //! All signals go through the same creep and dynamics: several at a time, in lanes.
 
@@ -26,14 +26,14 @@ const VECTORS: usize = 4;
 /// Most lanes of a vector of those that [`dispatch_fused`] chooses from.
 const MOST_LANES: usize = 4;
 
-/// What the columns go through.
+/// Parts that the columns go through.
 struct Parts {
     whole: (Relaxation, RelaxationFlow),
     /// Behind the creep: what its relaxations have reached goes through the dynamics alone.
     bare: (Relaxation, RelaxationFlow),
     /// With each number of the dynamics changed a little.
     nudged: Vec<(Relaxation, RelaxationFlow)>,
-    /// What a sampling interval leaves of each relaxation's departure.
+    /// Factor by which each relaxation's departure decays within a sampling interval.
     decay: Vec<f64>,
 }
 
@@ -73,9 +73,9 @@ pub(super) struct Columns<'f, 'a> {
     inner: usize,
     /// Behind the inputs, the stage last, then followers of nothing up to `width`.
     followers: Vec<Follower>,
-    /// What each relaxation has reached, behind the dynamics.
+    /// Level that each relaxation has reached, behind the dynamics.
     reached: Vec<Follower>,
-    /// What is left of each departure, and that behind the dynamics.
+    /// Remainder of each departure, and that behind the dynamics.
     left: Vec<f64>,
     faded: Vec<Follower>,
     /// The stage with each number of the dynamics changed a little.
@@ -178,7 +178,7 @@ impl<'f, 'a> Columns<'f, 'a> {
         Some((first, count))
     }
 
-    /// What follows from the stage's own input and creep.
+    /// Follow the columns of the stage's own input and creep.
     fn follow_stage(&mut self, steps: Range<usize>) {
         let Parts { whole, bare, nudged, decay } = &self.parts;
         let mut stage = self.followers[self.inner];

@@ -1,4 +1,4 @@
-//! What all fits of some records share.
+//! Data that all fits of some records share.
 
 use core::sync::atomic::{AtomicUsize, Ordering};
 
@@ -9,7 +9,7 @@ use crate::signal::{Drive, Stop, index, range};
 /// Least share of the mean slope that passes without memory: with less the inverse is no use.
 const LEAST_LINEAR: f64 = 1e-3;
 
-/// What all fits of some records share.
+/// Data that all fits of some records share.
 pub(super) struct Common<'a> {
     pub model: Model,
     pub of: &'static dyn AnySuperposition,

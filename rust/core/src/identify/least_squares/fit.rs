@@ -242,7 +242,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// What the sensor adds to the displacement at each sample of a record, m.
+    /// Level that the sensor adds to the displacement at each sample of a record, m.
     pub fn added(&self, r: usize) -> impl Fn(usize) -> f64 + use<> {
         let (own, record) = (self.own(r), &self.common.records[r]);
         let offset: f64 = self.x[own.offset].iter().sum();
@@ -251,13 +251,13 @@ impl<'a> Fit<'a> {
         move |k| drift.mul_add(fades(k, start), offset)
     }
 
-    /// What is left of a drift of 1 at sample `k` of a record that counts from `start` on.
+    /// Remainder of a drift of 1 at sample `k` of a record that counts from `start` on.
     pub fn fading(&self, r: usize) -> impl Fn(usize, usize) -> f64 + use<> {
         let rate = self.drifts[r].map_or(0.0, |time| self.common.records[r].drive.dt / time);
         move |k, start| libm::exp(rate * (index(start) - index(k)))
     }
 
-    /// What comes out of the signals, m.
+    /// Sum of the weighted signals, m.
     #[inline(always)]
     pub fn sum(&self, signals: &[f64]) -> f64 {
         let weighted: f64 =
@@ -269,7 +269,7 @@ impl<'a> Fit<'a> {
         &self.x[self.layout().corners()]
     }
 
-    /// What the dead zones make of it.
+    /// Output of the dead zones.
     #[inline(always)]
     pub fn bent(&self, value: f64) -> f64 {
         let zones = self.corners().iter().zip(&self.x[self.layout().bends()]);
@@ -352,7 +352,7 @@ impl<'a> Fit<'a> {
         Ok((sum, count))
     }
 
-    /// What is left of the displacement of a record, m.
+    /// Residual of the displacement of a record, m.
     pub fn rest(&self, r: usize) -> Result<Vec<f64>> {
         let added = self.added(r);
         let left = self.common.records[r].y.iter().zip(self.motion(r)?).enumerate();
@@ -379,7 +379,7 @@ impl<'a> Fit<'a> {
         Ok(self.common.of.values(&fitted))
     }
 
-    /// What was found.
+    /// Result of the fit.
     pub fn result(&self) -> Result<LeastSquaresFit> {
         let values = self.values(self.common.falls)?;
         self.common.model.build(&values)?;
@@ -434,7 +434,7 @@ fn windows(common: &Common<'_>) -> Vec<Range<usize>> {
     common.records.iter().map(|one| one.start..one.y.len()).collect()
 }
 
-/// What a dead zone passes, less what it passes of 0.
+/// Output of a dead zone, less its output at 0.
 #[inline(always)]
 fn beyond(value: f64, corner: f64) -> f64 {
     (value - corner).max(0.0) - (-corner).max(0.0)

@@ -23,7 +23,7 @@ impl Follower {
         Self { state, before: input }
     }
 
-    /// What comes out at the sample where `input` comes in, as the stage's simulation does.
+    /// Output at the sample where `input` comes in, as the stage's simulation does.
     #[inline(always)]
     pub fn next(
         &mut self,

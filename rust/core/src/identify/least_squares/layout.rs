@@ -42,7 +42,7 @@ pub(super) struct Layout {
 /// Where the unknowns are that a record has of its own, which follow those of the stage.
 #[derive(Clone, Debug)]
 pub(super) struct Own {
-    /// What each relaxation stands at before the record, beyond its equilibrium, m.
+    /// Level of each relaxation before the record, beyond its equilibrium, m.
     pub departures: Range<usize>,
     /// Displacement that the sensor shows at rest, m: none or one.
     pub offset: Range<usize>,

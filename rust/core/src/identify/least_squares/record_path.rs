@@ -201,7 +201,7 @@ impl Late {
         self.0.whole == 0 && self.0.part >= 1.0
     }
 
-    /// What is read at sample `k` of values at samples.
+    /// Reading at sample `k` of values at samples.
     pub fn of(self, k: usize, at: impl Fn(usize) -> f64) -> f64 {
         let (before, after) = self.between(k);
         let before = at(before);

@@ -3,7 +3,7 @@
 use crate::identify::records::history::History;
 use crate::models::Values;
 
-/// What was found.
+/// Result of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LeastSquaresFit {
     /// Parameters of the stage, as the model builds it.
@@ -21,7 +21,7 @@ pub struct LeastSquaresFit {
     pub lag_range: Option<(f64, f64)>,
 }
 
-/// What was found of one record.
+/// Result of a fit for one record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordFit {
     /// Displacement that the sensor shows at rest, m.
@@ -32,7 +32,7 @@ pub struct RecordFit {
     pub delay: f64,
     /// Root mean square of the deviations, m.
     pub rms: f64,
-    /// What went before the record.
+    /// Motion before the record.
     pub history: History,
     /// State of the stage before the first sample.
     pub start: Values,

@@ -1,6 +1,6 @@
 //! Settings of an identification by least squares, and the constants that its steps share.
 
-/// What is to be found of the stage.
+/// Settings of a fit: the unknowns of the stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Thresholds of plays, or levels.
@@ -30,7 +30,7 @@ pub enum PlacesKind {
 pub enum CreepKind {
     /// Relaxations of these time constants, s; none where empty.
     Times(Vec<f64>),
-    /// What the record shows.
+    /// Chosen from the record.
     Auto,
 }
 
@@ -53,7 +53,7 @@ pub enum DynamicsKind {
     First,
     /// A mode.
     Second,
-    /// What the record shows: a mode, the smallest lag that explains it, or none.
+    /// Chosen from the record: a mode, the smallest lag that explains it, or none.
     Auto,
 }
 

@@ -17,7 +17,7 @@ pub struct WeightsRecord<'a> {
     pub y: &'a [f64],
     /// First sample that counts; those before are warm-up.
     pub start: usize,
-    /// What went before the record; `None` chooses.
+    /// Motion before the record; `None` chooses.
     pub history: Option<History>,
     /// Whether the sensor shows something where the stage is at rest.
     pub offset: bool,

@@ -8,7 +8,7 @@ use crate::integrator::MOST_PARAMETERS;
 use crate::models::{Held, Measures, ModeShown, Model, Range, Ranges};
 use crate::signal::{Drive, Stop, index, range};
 
-/// What the bounds are built from.
+/// Measures from which the bounds are built.
 pub(in crate::identify) fn measures(record: &Record<'_>) -> Measures {
     Measures::of(&record.drive, record.y, record.window.clone())
 }
@@ -122,7 +122,7 @@ fn hull(one: Range, other: Range) -> Range {
     }
 }
 
-/// What a record shows, of a mode too.
+/// Measures of a record, those of a mode too.
 fn looked_through(record: &Record<'_>, wants_mode: bool, stop: Stop<'_>) -> Result<Measures> {
     let mut of = Measures { wants_mode, ..measures(record) };
     if !of.usable() {

@@ -24,7 +24,7 @@ pub enum DriftKind {
     None,
     /// With this time constant, s.
     Time(f64),
-    /// What the record shows.
+    /// Chosen from the record.
     Auto,
 }
 

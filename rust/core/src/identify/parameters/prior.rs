@@ -26,7 +26,7 @@ const LEAST: f64 = 1e-3;
 /// to find its way from wherever it starts without an overflow.
 const MOST_EXPONENT: f64 = 300.0;
 
-/// What is known of a parameter.
+/// Prior knowledge of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
     /// Place of the parameter.

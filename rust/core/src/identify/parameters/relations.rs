@@ -1,4 +1,4 @@
-//! What a caller says of parameters besides their bounds: ties, inequalities and priors.
+//! Relations of parameters besides their bounds: ties, inequalities and priors.
 
 use super::candidate::{DELAY, PLACES, Theta};
 use super::constraint::{self, Constraint};
@@ -16,7 +16,7 @@ pub struct Relations {
     pub ties: Vec<Tie>,
     /// Each after those that limit its larger parameter.
     pub constraints: Vec<Constraint>,
-    /// What is known besides the record.
+    /// Knowledge besides the record.
     pub priors: Vec<Prior>,
     /// Samples in the window of the record, which stand against the priors.
     pub samples: usize,

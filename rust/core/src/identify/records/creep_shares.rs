@@ -21,7 +21,7 @@ pub const MOST_CREEP: f64 = 0.5;
 /// A pivot below this part of its diagonal is 0: the column is a combination of the others.
 pub(in crate::identify) const LEAST_PIVOT: f64 = 1e-12;
 
-/// What a column that is a combination of others, but for [`LEAST_PIVOT`], can still move.
+/// Movement left to a column that is a combination of others, but for [`LEAST_PIVOT`].
 pub(in crate::identify) const SLACK: f64 = 1e-6;
 
 /// Shares of the relaxations; 0 for those that there are not.

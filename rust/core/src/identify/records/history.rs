@@ -7,7 +7,7 @@
 use crate::error::{Error, Result};
 use crate::signal::{Drive, Hold, range, turns};
 
-/// What is assumed of the drive before a record.
+/// Assumption about the drive before a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum History {
     /// The stage never moved before: it goes from 0 V to the first sample.

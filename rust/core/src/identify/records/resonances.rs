@@ -175,7 +175,7 @@ impl Steps {
         })
     }
 
-    /// What the dynamics make of a signal, from rest.
+    /// Response of the dynamics to a signal, from rest.
     fn of(&self, input: &[f64]) -> Vec<f64> {
         let (mut x, mut w) = (input.first().copied().unwrap_or(0.0), 0.0);
         let mut all = Vec::with_capacity(input.len());
@@ -191,7 +191,7 @@ impl Steps {
     }
 }
 
-/// What the displacement is compared with.
+/// Signals with which the displacement is compared.
 struct Trial<'a> {
     drive: Drive<'a>,
     /// Samples that are compared.
@@ -268,7 +268,7 @@ impl<'a> Trial<'a> {
         [vec![rest], further].concat()
     }
 
-    /// What a mode makes of the drive beyond the drive itself and its rate, rms, m.
+    /// Response of a mode to the drive beyond the drive itself and its rate, rms, m.
     fn swings(&self, mode: Mode) -> f64 {
         let [_, u] = &self.few;
         let Some(steps) = Steps::new(mode.dynamics(), &self.drive) else { return 0.0 };
@@ -341,7 +341,7 @@ impl<'a> Trial<'a> {
         Some(starts)
     }
 
-    /// What the modes that are known leave of the displacement.
+    /// Residual of the displacement beside the modes that are known.
     fn rest(&self, known: &[Mode]) -> Vec<f64> {
         if known.is_empty() {
             return self.y.clone();

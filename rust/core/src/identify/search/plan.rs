@@ -8,7 +8,7 @@ use crate::math::available;
 /// How a problem is searched.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// What searches.
+    /// Search method.
     pub method: Method,
     /// Seed of the random numbers.
     pub seed: u64,
@@ -16,7 +16,7 @@ pub struct Plan {
     pub runs: usize,
 }
 
-/// What searches.
+/// Search method.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
     /// A particle swarm.

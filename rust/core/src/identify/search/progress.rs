@@ -1,4 +1,4 @@
-//! What a search tells on its way, and what each of its runs found.
+//! Progress of a search, and the outcome of each of its runs.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;

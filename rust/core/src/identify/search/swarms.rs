@@ -31,7 +31,7 @@ impl Run {
         })
     }
 
-    /// What the swarm wants to know now; nothing once it has ended.
+    /// Points whose costs the swarm needs now; none once it has ended.
     fn candidates(&self) -> Vec<Point> {
         if self.reason.is_some() {
             return Vec::new();

@@ -67,7 +67,7 @@ pub struct SwarmSettings {
     pub topology: Topology,
     /// Largest velocity of a coordinate, as a fraction of its range; infinite for none.
     pub velocity_limit: f64,
-    /// What happens at the bounds.
+    /// Treatment of particles at the bounds.
     pub boundary: Boundary,
     /// Improvement of the best cost, in m, below which an iteration counts as a stall.
     pub min_improvement: f64,

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 import piezotrack as pt
-from piezotrack._support import result_set
-from piezotrack._support.files import make_folder, replacing, together, write_document
-from piezotrack._support.result_set import MARKER
+from piezotrack._support import result_files
+from piezotrack._support.files import make_folder, replacing, result_set, write_document
+from piezotrack._support.result_files import MARKER
 from piezotrack._support.temporary import this_host
 
 NAMES = ["a.csv", "b.json", "c.png", "d.svg"]
@@ -23,7 +23,7 @@ POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows cannot tell whether 
 
 
 def save(folder: Path, text: str, names: list[str] = NAMES) -> None:
-    with together(folder):
+    with result_set(folder):
         for name in names:
             with replacing(folder / name) as file:
                 file.write_text(text)
@@ -42,7 +42,7 @@ def test_nothing_is_replaced_before_all_are_complete(tmp_path: Path) -> None:
     save(tmp_path, "old")
 
     def interrupted() -> None:
-        with together(tmp_path):
+        with result_set(tmp_path):
             for name in NAMES[:3]:
                 with replacing(tmp_path / name) as file:
                     file.write_text("new")
@@ -56,7 +56,7 @@ def test_nothing_is_replaced_before_all_are_complete(tmp_path: Path) -> None:
 
 
 def test_a_set_within_a_set_joins_it(tmp_path: Path) -> None:
-    with together(tmp_path):
+    with result_set(tmp_path):
         save(tmp_path, "first", NAMES[:2])
         assert not (tmp_path / "a.csv").exists()
         save(tmp_path, "second", NAMES[1:])
@@ -68,7 +68,7 @@ def test_a_set_within_a_set_joins_it(tmp_path: Path) -> None:
 KILLED = """
 import os, pathlib, signal, sys
 sys.path.insert(0, sys.argv[3])
-from test_result_set import save
+from test_result_files import save
 count, replace = int(sys.argv[2]), pathlib.Path.replace
 def some(path, target):
     global count
@@ -225,7 +225,7 @@ MARKERS = [
 def test_a_marker_that_is_no_marker_is_removed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
 ) -> None:
-    monkeypatch.setattr(result_set, "PATIENCE", 0.05)
+    monkeypatch.setattr(result_files, "PATIENCE", 0.05)
     (tmp_path / MARKER).write_text(text)
     save(tmp_path, "new")
     assert content(tmp_path) == dict.fromkeys(NAMES, "new")
@@ -275,13 +275,13 @@ def test_a_folder_without_a_name_is_refused() -> None:
 def test_an_interruption_while_the_marker_is_set_leaves_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write = result_set._write
+    write = result_files._write
 
     def interrupted(*args: Any, **kwargs: Any) -> None:
         write(*args, **kwargs)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(result_set, "_write", interrupted)
+    monkeypatch.setattr(result_files, "_write", interrupted)
     with pytest.raises(KeyboardInterrupt):
         save(tmp_path, "new")
     assert list(tmp_path.iterdir()) == []

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 BATCH = 250
 
 
-def hunt(tally: Tally, body: Callable[[Script, Any], None], *, calls: int, start: int) -> None:
+def fuzz(tally: Tally, body: Callable[[Script, Any], None], *, calls: int, start: int) -> None:
     """Call `body(script, draw)` with seeds from `start` on until `calls` calls are made.
 
     Nothing is shrunk: a failure is counted, and its calls kept as a script.

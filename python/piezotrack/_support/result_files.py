@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     # A complete temporary file, and the result that it becomes.
     Pair = tuple[Path, Path]
 
-__all__ = ["MARKER", "current_set", "finish_others", "together"]
+__all__ = ["MARKER", "current_set", "finish_others", "result_set"]
 
 MARKER = "piezotrack-incomplete.json"
 NOTE = (
@@ -43,7 +43,7 @@ _swept: set[str] = set()
 
 
 class ResultSet:
-    """Temporary files waiting for the end of `together`."""
+    """Temporary files waiting for the end of `result_set`."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -80,16 +80,16 @@ _current: ContextVar[ResultSet | None] = ContextVar("_current", default=None)
 
 
 def current_set(folder: Path) -> ResultSet | None:
-    """Return the set that a file in `folder` belongs to, if `together` is under way."""
+    """Return the set that a file in `folder` belongs to, if `result_set` is under way."""
     found = _current.get()
     return found if found is not None and found.folder == folder else None
 
 
 @contextmanager
-def together(folder: Path) -> Iterator[Path]:
+def result_set(folder: Path) -> Iterator[Path]:
     """Put all files that are written within in place at its end, or none if it fails.
 
-    Within another `together` of the same folder, the files join that one's.
+    Within another `result_set` of the same folder, the files join that one's.
 
     Parameters
     ----------

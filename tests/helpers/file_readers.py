@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import piezotrack as pt
-from soak import judged, not_finite
+from soak import not_finite, verdict_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -76,6 +76,6 @@ def faults_of_file(kind: str, content: bytes) -> tuple[list[str], bool]:
     use, ending = READERS[kind]
     name = f"given{ending}"
     Path(name).write_bytes(content)
-    faults, value = judged(lambda: use(name))
+    faults, value = verdict_of(lambda: use(name))
     faults += [f"not finite: {where}" for where in not_finite(value)][:1]
     return faults, isinstance(value, (tuple, list))

@@ -1,4 +1,4 @@
-"""Drives of an experiment: voltage as a function of time."""
+"""Excitations of an experiment: voltage as a function of time."""
 
 from __future__ import annotations
 
@@ -209,7 +209,7 @@ RANGE: dict[tuple[str, str], tuple[str, ...]] = {
     ("time", ""): ("duration",),
 }
 PERIODIC: dict[tuple[str, str], tuple[str, ...]] = {("frequency", ""): ("frequency",), **RANGE}
-DRIVES = {
+EXCITATIONS = {
     "decaying": Kind(
         decaying,
         "decaying:FREQUENCY,LOW..HIGH[,DURATION]",
@@ -298,7 +298,7 @@ def parse_drive(text: str, *, duration: float | None = None) -> Drive:
     >>> pt.hardware.parse_drive("sine:0.5Hz,0..75V")
     Drive(sine 0.5 Hz, 0 to 75 V, 8 s)
     """
-    drive: Drive = made_from_text("drive", text, DRIVES, _recorded, duration)
+    drive: Drive = made_from_text("drive", text, EXCITATIONS, _recorded, duration)
     return drive
 
 
