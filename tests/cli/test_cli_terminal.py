@@ -90,7 +90,7 @@ def test_a_folder_without_access_is_named(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_file_without_access_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("piezotrack.identification.fitted.identified_model.load", refused)
+    monkeypatch.setattr("piezotrack.identification.fitted.model_file.load", refused)
     assert refusal(*WORK) == "dahl.json: permission denied"
 
 

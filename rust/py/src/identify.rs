@@ -37,7 +37,7 @@ fn reason_name(reason: StopReason) -> &'static str {
     }
 }
 
-/// What a search found of one parameter, as a dict in Python.
+/// Estimate of one parameter, as a dict in Python.
 #[derive(IntoPyObject)]
 struct Estimate {
     name: &'static str,
@@ -55,7 +55,7 @@ struct Estimate {
     prior: Option<(f64, f64)>,
 }
 
-/// What one of the records has of its own, as a dict in Python.
+/// Values of one of the records, as a dict in Python.
 #[derive(IntoPyObject)]
 struct Own {
     /// RMS deviation, m, without priors.
@@ -68,7 +68,7 @@ struct Own {
     drift: f64,
 }
 
-/// What a search found, in plain numbers.
+/// Result of a search, in plain numbers.
 #[pyclass(name = "Search", frozen, module = "piezotrack._core")]
 struct PySearch {
     found: Identification,
@@ -84,7 +84,7 @@ impl PySearch {
         names.enumerate().filter_map(|(place, name)| self.estimate(0, place, name)).collect()
     }
 
-    /// What each record has of its own, in their order.
+    /// Values of each record, in their order.
     #[getter]
     fn records(&self) -> Vec<Own> {
         let own = |(r, one): (usize, &OwnResult)| {
@@ -105,7 +105,7 @@ impl PySearch {
         self.outcome.costs.rms / relations.factor(&self.outcome.theta)
     }
 
-    /// What was minimised, with the factor of the priors; None without priors.
+    /// Minimised cost, with the factor of the priors; None without priors.
     #[getter]
     fn rms_with_priors(&self) -> Option<f64> {
         let known = !self.found.problem.relations.priors.is_empty();
@@ -207,7 +207,7 @@ impl PySearch {
 }
 
 impl PySearch {
-    /// What was found at a place of a record's parameters.
+    /// Value at a place of a record's parameters.
     fn estimate(&self, r: usize, place: usize, name: &'static str) -> Option<Estimate> {
         let OwnResult { problem, theta, .. } = self.found.records.get(r)?;
         // A mass that the record does not show is held where it has no effect.
@@ -254,7 +254,7 @@ fn voltages_before<'py>(
     array(py, voltages().map_err(|error| raise(&error))?.into_iter())
 }
 
-/// What searches, in Python.
+/// Settings of a search, in Python.
 #[derive(FromPyObject)]
 enum Searcher<'py> {
     Swarm(PyRef<'py, PySettings>),

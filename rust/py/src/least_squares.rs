@@ -51,7 +51,7 @@ impl PyLeastSquaresFit {
         self.0.at_bound.clone()
     }
 
-    /// What each record has of its own, in their order.
+    /// Values of each record, in their order.
     #[getter]
     fn records(&self) -> Vec<Own> {
         self.0.records.iter().map(Own::of).collect()
@@ -64,7 +64,7 @@ impl PyLeastSquaresFit {
     }
 }
 
-/// What one of the records has of its own, as a dict in Python.
+/// Values of one of the records, as a dict in Python.
 #[derive(IntoPyObject)]
 struct Own {
     /// RMS deviation, m.

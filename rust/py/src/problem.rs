@@ -91,7 +91,7 @@ fn entries(mapping: &Bound<'_, PyAny>) -> PyResult<Vec<(String, PyParameter)>> {
 pub struct Question {
     pub model: Model,
     pub records: Vec<OneRecord>,
-    /// What is asked of the stage, without what is each record's own.
+    /// Specification of the stage, without the values of each record.
     spec: Spec,
     /// Known time constants of the creep; those that suit the records where there are none.
     creep: Option<Vec<f64>>,

@@ -1,4 +1,4 @@
-"""What a campaign has found: a sequence of results, as a table, a data frame and a picture."""
+"""Results of a campaign: a sequence, as a table, a data frame and a picture."""
 
 from __future__ import annotations
 

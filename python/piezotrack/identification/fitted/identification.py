@@ -286,8 +286,9 @@ class Identification(IdentifiedModel):
         --------
         >>> from matplotlib.figure import Figure
         >>> import piezotrack as pt
-        >>> log, few = pt.datasets.dbo_training()[3.0:5.0], pt.ParticleSwarm(iterations=3)
-        >>> fit = pt.identify(log, "dahl", swarm=few, runs=1, seed=1, progress=False)
+        >>> log = pt.datasets.dbo_training()[3.0:5.0]
+        >>> few = pt.ParticleSwarm(iterations=3, runs=1, seed=1)
+        >>> fit = pt.identify(log, "dahl", method=few, progress=False)
         >>> fit.plot_convergence(ax=Figure().subplots()).get_ylabel()
         'best cost, rms [um]'
         """

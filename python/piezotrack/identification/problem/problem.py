@@ -29,7 +29,7 @@ NOTHING_SAID = {"offset": True, "delay": None, "drift": None, "history": None, "
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
-    """What is identified from which records; how, is said by a method.
+    """Problem of an identification: model, records and parameters, without the method.
 
     The compiled module reads its attributes.
 
@@ -59,7 +59,7 @@ class Problem:
     creep: bool | tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
-        if self.model == AUTO:
+        if isinstance(self.model, str) and self.model == AUTO:
             self._refuse_of_one_model()
         elif not self.info.searched:
             for name in ("parameters", "constraints", "creep"):

@@ -127,7 +127,7 @@ impl ModeFlow {
     }
 }
 
-/// What a step makes of displacement and velocity and of force and ramp, each with its factor.
+/// Value after a step: displacement and velocity, force and ramp, each times its factor.
 ///
 /// No closure: those of lanes are not compiled for their instruction set unless they are inlined.
 #[inline(always)]
@@ -269,7 +269,7 @@ impl Relaxation {
         }
     }
 
-    /// What the modes beside the main one add to displacement and velocity.
+    /// Displacement and velocity that the modes beside the main one add.
     #[inline(always)]
     fn beside<N: Number>(&self, state: &RelaxationState<N>) -> (N, N) {
         let modes = self.dynamics.further().iter().zip(state.mode_x.iter().zip(&state.mode_v));

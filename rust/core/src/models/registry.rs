@@ -130,7 +130,7 @@ macro_rules! models {
         }
 
         impl Model {
-            /// What least squares find of it; `None` where a swarm searches its parameters.
+            /// Superposition whose weights least squares find; `None` where its parameters are searched.
             #[must_use]
             pub fn superposition(self) -> Option<&'static dyn AnySuperposition> {
                 match self {

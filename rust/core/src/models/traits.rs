@@ -21,7 +21,7 @@ pub type Published = (&'static str, fn() -> Values);
 pub struct ModelInfo {
     /// The name that both languages use.
     pub name: &'static str,
-    /// What a table or a picture calls it.
+    /// Title in tables and pictures.
     pub title: &'static str,
     /// Unit of the drive: V, or N of a model under a force.
     pub drive_unit: &'static str,

@@ -102,7 +102,7 @@ const DIFFERENCE: [f64; 7] = [
 struct Rk45<'a> {
     stage: &'a DahlStage,
     tolerance: f64,
-    /// What errors of small values are measured against.
+    /// Scale against which errors of small values are measured.
     size: State,
     /// Step carried from one interval to the next, s.
     step: f64,

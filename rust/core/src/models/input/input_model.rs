@@ -18,7 +18,7 @@ pub trait InputModel: Segmented {
     /// The name that both languages use.
     const NAME: &'static str;
 
-    /// What a table or a picture calls it.
+    /// Title in tables and pictures.
     const TITLE: &'static str;
 
     /// Parameters of the operator; those of creep and dynamics follow them.

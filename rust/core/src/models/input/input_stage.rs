@@ -118,7 +118,7 @@ pub trait Remembering: InputOperator {
     /// if it can go to `volts` from there.
     ///
     /// # Errors
-    /// What was expected, where these numbers are no memory.
+    /// Expected entries, where these numbers are no memory.
     fn recall(
         &self,
         state: &mut Self::State,

@@ -44,7 +44,7 @@ pub enum Places {
 pub struct Shape {
     /// Least and largest, between which it is searched on a logarithmic scale.
     pub range: (f64, f64),
-    /// What it is where a record does not tell.
+    /// Value where a record does not determine it.
     pub neutral: f64,
 }
 
@@ -75,7 +75,7 @@ pub trait Signals: Debug + Send + Sync {
     fn follow(&self, memory: &mut Vec<f64>, volts: f64, dt: f64, signals: &mut [f64]);
 }
 
-/// What the signals of a model are made from.
+/// Inputs from which the signals of a model are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SignalsOf<'a> {
     /// Numbers of the shape, see [`Superposition::shapes`].

@@ -1,4 +1,4 @@
-//! What the stages of a mass on a spring have in common as parameters and as states.
+//! Parameters and states that the stages of a mass on a spring have in common.
 
 use super::values::ParameterInfo;
 

@@ -32,7 +32,7 @@ pub type Range = (f64, f64);
 /// Ranges by the names of the parameters.
 pub type Ranges = Vec<(&'static str, Range)>;
 
-/// What a record shows of a mode.
+/// Mode as a record shows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ModeShown {
     /// It was not looked through for one.
@@ -45,7 +45,7 @@ pub enum ModeShown {
     Clear(f64),
 }
 
-/// What the ranges are built from.
+/// Measures of a record from which the ranges are built.
 #[derive(Clone, Copy, Debug)]
 pub struct Measures {
     /// Range of the displacement, m.
@@ -64,7 +64,7 @@ pub struct Measures {
     pub quickness: f64,
     /// Whether the caller asks for a mode, whatever the record shows.
     pub wants_mode: bool,
-    /// What the record shows of a mode.
+    /// Mode as the record shows it.
     pub mode: ModeShown,
     /// Sampling interval, s.
     pub dt: f64,

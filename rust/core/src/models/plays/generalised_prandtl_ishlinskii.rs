@@ -70,9 +70,9 @@ const PARAMETERS: &[ParameterInfo] = &[
 /// The operator: plays between two envelopes, V to m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GeneralisedPlays {
-    /// What pushes the plays up.
+    /// Envelope that pushes the plays up.
     rising: TanhEnvelope,
-    /// What pushes them down.
+    /// Envelope that pushes them down.
     falling: TanhEnvelope,
     /// 0, then r, V; what is not used weighs 0.
     thresholds: [f64; SLOTS],

@@ -83,9 +83,9 @@ pub struct DuhemParameters {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DuhemOperator {
     parameters: DuhemParameters,
-    /// What a rise approaches, m.
+    /// Limit of a rise, m.
     rising: CubicCurve,
-    /// What a fall approaches, m.
+    /// Limit of a fall, m.
     falling: CubicCurve,
     /// f(0), m: the output at rest.
     zero: f64,
@@ -189,7 +189,7 @@ impl DuhemOperator {
         self.taken(&state, volts).output - self.zero
     }
 
-    /// What a rise or a fall approaches.
+    /// Limit of a rise or a fall.
     #[inline]
     fn limit(&self, rises: bool) -> &CubicCurve {
         if rises { &self.rising } else { &self.falling }
