@@ -490,5 +490,7 @@ def test_a_log_that_is_cut_off_within_its_last_field_is_refused(tmp_path: Path, 
 def test_a_whole_last_line_without_its_end_is_read(tmp_path: Path) -> None:
     """Numbers of fixed decimals may become shorter: 10.02, 9.98."""
     falling = [f"{0.01 * k:.2f},{k % 7},{10.5 - 0.05 * k:.2f}" for k in range(12)]
-    for rows in (falling, falling[:3]):
+    # Shortest digits that end at rest.
+    resting = [f"{0.01 * k:.2f},{k % 7},{(11 - k) / 7.0!r}" for k in range(11)] + ["0.11,4,0"]
+    for rows in (falling, falling[:3], resting):
         assert pt.read(write(tmp_path, "\n".join([HEADER, *rows]))).y.size == len(rows)

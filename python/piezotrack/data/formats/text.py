@@ -185,7 +185,8 @@ class TextTable(Table):
         """Refuse a log that was cut off within the last field of its last line.
 
         Many whole files do not end that line, so it is taken for a half one only where the field
-        is shorter, or has fewer decimals, than those of all samples before it.
+        has fewer decimals than those of all samples before it; and not where it is 0, at rest, in
+        numbers written with their shortest digits.
         """
         lines, last = self.layout.lines, self.layout.last
         if last != len(lines) or not lines[-1].strip() or self._count <= LEAST_BEFORE:
@@ -196,15 +197,13 @@ class TextTable(Table):
         if len(half) != len(rows[-1]):
             # Refused for the number of its fields.
             return
-        lengths, decimals = zip(*(_lengths(row[-1]) for row in rows), strict=True)
-        length, places = _lengths(half[-1])
-        # Of a fixed number of decimals, the numbers before them may be of any length.
-        is_fixed = min(decimals) == max(decimals) > 0
-        if places < min(decimals) or (length < min(lengths) and not is_fixed):
+        decimals = [_decimals(row[-1]) for row in rows]
+        is_fixed = min(decimals) == max(decimals)
+        if _decimals(half[-1]) < min(decimals) and (is_fixed or half[-1].strip() != "0"):
             raise self.source.error(
-                f"the file ends in this line, whose last field {quoted(half[-1])} is shorter than "
-                "in all lines before it: expected a whole line, or the end of one behind it; the "
-                "log may have been cut off",
+                f"the file ends in this line, whose last field {quoted(half[-1])} has fewer "
+                "decimals than in all lines before it: expected a whole line, or the end of one "
+                "behind it; the log may have been cut off",
                 last,
             )
 
@@ -329,10 +328,10 @@ def _commented_titles(
     return (above[-1] + 1, titles) if len(titles) == count and are_titles(titles) else None
 
 
-def _lengths(text: str) -> tuple[int, int]:
-    """Return the number of characters of a field, and of those behind its decimal mark."""
+def _decimals(text: str) -> int:
+    """Return the number of characters of a field behind its decimal mark."""
     mark = max(text.rfind("."), text.rfind(","))
-    return len(text), len(text) - 1 - mark if mark >= 0 else 0
+    return len(text) - 1 - mark if mark >= 0 else 0
 
 
 def _seconds(text: str, first: Instant) -> float:
