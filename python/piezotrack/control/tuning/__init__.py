@@ -1,1 +1,1 @@
-"""Gains that nobody picks by hand."""
+"""Search for gains under margins, and other designs of a law."""

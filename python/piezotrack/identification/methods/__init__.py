@@ -1,1 +1,1 @@
-"""MethodChoice of a search, as settings."""
+"""Methods of a search, as settings."""

@@ -24,7 +24,7 @@ __all__ = ["AUTO", "Problem"]
 # The name that stands for the model that suits the records best.
 AUTO = "auto"
 # Defaults of a record that are not part of the settings of a problem.
-NOTHING_SAID = {"offset": True, "delay": None, "drift": None, "history": None, "weight": 1.0}
+RECORD_DEFAULTS = {"offset": True, "delay": None, "drift": None, "history": None, "weight": 1.0}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,7 +93,7 @@ class Problem:
         others = {
             name: one
             for name, one in self.parameters.items()
-            if name != "stiffness" or list(_said(one)) != ["value"]
+            if name != "stiffness" or list(_stated(one)) != ["value"]
         }
         for name, value in (("parameters", others), ("constraints", self.constraints)):
             if value:
@@ -142,7 +142,7 @@ class Problem:
     def settings(self) -> dict[str, Any]:
         """Return all but the records as plain data, without defaults."""
         of_stage = {
-            "parameters": {name: _said(one) for name, one in self.parameters.items()},
+            "parameters": {name: _stated(one) for name, one in self.parameters.items()},
             "constraints": list(self.constraints),
             "creep": self.creep,
         }
@@ -157,7 +157,7 @@ class Problem:
         return [
             {
                 name: as_plain_data(name, value)
-                for name, default in NOTHING_SAID.items()
+                for name, default in RECORD_DEFAULTS.items()
                 if (value := getattr(one, name)) != default
             }
             for one in self.records
@@ -169,7 +169,7 @@ class Problem:
         return [hashes, self.record_settings(), self.settings()]
 
 
-def _said(parameter: Parameter) -> dict[str, Any]:
+def _stated(parameter: Parameter) -> dict[str, Any]:
     """Return what is said of a parameter."""
     return {name: value for name, value in vars(parameter).items() if value is not None}
 
