@@ -332,11 +332,10 @@ def _of_frequencies(drive: DriveFeatures) -> list[str]:
     least, most = drive.frequencies
     if most < 2.0 * least:
         return [
-            f"one rate, {most:.3g} Hz: a lag is not told from hysteresis and creep, nor a delay "
-            "from a lag"
+            f"one rate, {most:.3g} Hz: lag, delay, creep and hysteresis cannot be distinguished"
         ]
-    told = "lag and delay are" if most >= DECADE * least else "a lag is partly"
-    return [f"rates from {least:.3g} Hz to {most:.3g} Hz: {told} told from hysteresis"]
+    known = "lag and delay can" if most >= DECADE * least else "a lag can partly"
+    return [f"rates from {least:.3g} Hz to {most:.3g} Hz: {known} be distinguished from hysteresis"]
 
 
 def _of_mode(time: TimeFeatures, drive: DriveFeatures) -> str:
@@ -355,7 +354,10 @@ def _of_rests(time: TimeFeatures, drive: DriveFeatures) -> str:
     # Before the first motion there is nothing to creep after.
     rests = [stop - start for start, stop, _ in drive.rests if start > time.begin]
     if not rests:
-        return "no rests: creep is not told from hysteresis; record a step and a hold of minutes"
+        return (
+            "no rests after the first motion: creep and hysteresis cannot be distinguished; record "
+            "a step and a hold of minutes"
+        )
     return f"the drive rests for up to {max(rests):.3g} s: creep with time constants up to that"
 
 

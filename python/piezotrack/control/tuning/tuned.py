@@ -106,7 +106,7 @@ class TuningReport:
         if self.runs:
             scale, unit = (1e6, "um") if self.unit == "m" else (1.0, self.unit)
             lines.append(
-                f"{scale * self.value:.4g} {unit} where it counts: settled, and learnt where "
+                f"{scale * self.value:.4g} {unit} after settling, and after learning where "
                 "something learns"
             )
         for run in self.runs:
