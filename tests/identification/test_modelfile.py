@@ -202,9 +202,7 @@ def test_the_file_says_where_the_numbers_come_from(tmp_path: Path) -> None:
     assert provenance["package"] == "piezotrack"
     assert provenance["version"] == pt.__version__ == version("piezotrack")
     assert provenance["seed"] == 1
-    swarm = fitted().swarm
-    assert swarm is not None
-    assert provenance["swarm"] == swarm.settings()
+    assert provenance["swarm"] == fitted().method.settings()
     data = provenance["data"]
     # The hash as the documentation has it: dt, the drive and displacement kept, the warm-up.
     kept = quick()[:3.0]

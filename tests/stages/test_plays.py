@@ -217,7 +217,7 @@ def test_the_settings_have_defaults() -> None:
     log = record(PLAIN, samples=1000)
     fit = pt.identify(log, model="prandtl-ishlinskii")
     assert fit.document() == fit_plays(log).document()
-    assert (fit.success, fit.stop_reason, fit.swarm) == (True, "solved", None)
+    assert (fit.success, fit.stop_reason) == (True, "solved")
     bare = pt.identify(log, model="prandtl-ishlinskii", offset=False)
     assert bare.offset == 0.0
     assert not bare.offset_fitted

@@ -11,6 +11,8 @@ import numpy as np
 
 from ..._support.statistics import sample_noise
 from ...data import diagnostics
+from ..methods.descents import Descents
+from ..methods.particle_swarm import ParticleSwarm
 from .fitted_record import FittedRecord
 from .identified_model import IdentifiedModel
 from .notes import above_noise, deviation_of, drift_notes, first_samples, fit_percent, lag_notes
@@ -23,9 +25,7 @@ if TYPE_CHECKING:
 
     from ...data.dataset import Dataset
     from ...stages.motion import Response
-    from ..methods.descents import Descents
     from ..methods.least_squares import LeastSquares
-    from ..methods.particle_swarm import ParticleSwarm
     from .estimates import Constraint, Estimate, LagRange, StopReason, SwarmRun
     from .score import Score
     from .trial import Trial
@@ -42,8 +42,8 @@ OTHER = 1.5
 class Identification(IdentifiedModel):
     """Result of an identification; see `IdentifiedModel` for its use.
 
-    After a search all attributes but `least_squares` and `at_bound` are set; after a fit by
-    least squares these two, and the first four.
+    After a fit by least squares `at_bound`, `lags` and the first five attributes are set; after a
+    search all but `at_bound`.
 
     Attributes
     ----------
@@ -59,6 +59,8 @@ class Identification(IdentifiedModel):
         Simulations of the record, of all runs.
     stop_reason : {"agreed", "converged", "stalled", "iterations", "interrupted", "solved"}
         Why the fit ended; ``"solved"`` after least squares.
+    method : Descents or ParticleSwarm or LeastSquares
+        Method that found it, with its settings.
     parameters : dict of str to Estimate
         The parameters with units, bounds and standard deviations; and the delay where it
         was fitted. Empty after least squares.
@@ -82,17 +84,9 @@ class Identification(IdentifiedModel):
         the best one.
     substeps, order : int
         Steps of the integrator in each sampling interval and their order, fixed for the search.
-    seed : int or None
-        Seed of the random numbers.
     agreeing : int
         Number of runs that ended within 0.1 % of the lowest cost; of descents before the local
         refinement of the best one. Costs below 0.001 % of the stroke count as equal.
-    swarm : ParticleSwarm or None
-        Settings of the swarm, where one searched.
-    descents : Descents or None
-        Settings of the descents, where they searched.
-    least_squares : LeastSquares or None
-        Settings of the least squares.
     lags : LagRange or None
         Lags that fit as well, where the drive is too slow to tell them from hysteresis and creep.
     trials : tuple of Trial
@@ -115,6 +109,7 @@ class Identification(IdentifiedModel):
     cost: float
     nfev: int
     stop_reason: StopReason
+    method: Descents | ParticleSwarm | LeastSquares
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     constraints: tuple[Constraint, ...] = ()
     scales: Mapping[str, str] = field(default_factory=dict)
@@ -126,11 +121,7 @@ class Identification(IdentifiedModel):
     runs: tuple[SwarmRun, ...] = ()
     substeps: int = 1
     order: int = 0
-    seed: int | None = None
     agreeing: int = 0
-    swarm: ParticleSwarm | None = None
-    descents: Descents | None = None
-    least_squares: LeastSquares | None = None
     lags: LagRange | None = None
     trials: tuple[Trial, ...] = ()
     fitted_until: float | None = None
@@ -219,7 +210,7 @@ class Identification(IdentifiedModel):
                 "the record does not determine the dynamics: time constant or mode lies on a bound"
             )
         if len(self.runs) > 1 and self.agreeing == 1:
-            what = "restart" if self.swarm is not None else "descent"
+            what = "restart" if isinstance(self.method, ParticleSwarm) else "descent"
             notes.append(f"no other {what} ended in the minimum of the best one: increase runs=")
         return notes
 
@@ -251,17 +242,18 @@ class Identification(IdentifiedModel):
     @property
     def message(self) -> str:
         """Why the fit ended, in words."""
-        if self.stop_reason == "stalled" and self.swarm is not None:
+        method = self.method
+        if self.stop_reason == "stalled" and isinstance(method, ParticleSwarm):
             return (
-                f"{self.swarm.stall_iterations} iterations in a row improved the cost by less than "
-                f"{1e6 * self.swarm.min_improvement:g} um"
+                f"{method.stall_iterations} iterations in a row improved the cost by less than "
+                f"{1e6 * method.min_improvement:g} um"
             )
-        if self.stop_reason == "iterations" and self.swarm is not None:
-            return f"all {self.swarm.iterations} iterations were done"
+        if self.stop_reason == "iterations" and isinstance(method, ParticleSwarm):
+            return f"all {method.iterations} iterations were done"
         if self.stop_reason == "agreed":
             return "independent descents agree"
-        if self.stop_reason == "iterations" and self.descents is not None:
-            return f"all {self.descents.rounds} rounds were done"
+        if self.stop_reason == "iterations" and isinstance(method, Descents):
+            return f"all {method.rounds} rounds were done"
         return self.stop_reason
 
     def plot_convergence(self, *, ax: Axes | None = None) -> Axes:

@@ -17,13 +17,13 @@ from ..fitted.identification import Identification
 from ..fitted.model_entries import constraint_entries, fit_entry, origin_of, provenance
 from ..fitted.notes import deviation_of
 from ..fitted.start import start_after
-from ..methods.descents import Descents
-from ..methods.particle_swarm import ParticleSwarm
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from ...stages.model_info import ModelInfo
+    from ..methods.descents import Descents
+    from ..methods.particle_swarm import ParticleSwarm
     from ..problem.problem import Problem
     from ..problem.records import Record
     from .run import Run
@@ -163,10 +163,8 @@ def _identification(
         runs=tuple(SwarmRun(*run) for run in found.runs),
         substeps=found.substeps,
         order=found.order,
-        seed=method.seed,
         agreeing=found.agreeing,
-        swarm=method if isinstance(method, ParticleSwarm) else None,
-        descents=method if isinstance(method, Descents) else None,
+        method=method,
     )
 
 

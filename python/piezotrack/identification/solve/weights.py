@@ -114,7 +114,7 @@ def solve_least_squares(
         cost=found.rms,
         nfev=found.evaluations,
         stop_reason="solved",
-        least_squares=settings,
+        method=settings,
         at_bound=any(name in DYNAMICS for name in found.at_bound),
         lags=_lags(found.lag_range),
         start=first.start,

@@ -31,6 +31,7 @@ from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
 from ...stages.motion import Response
 from ..fitted.identification import Identification
+from ..methods.particle_swarm import ParticleSwarm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -196,7 +197,7 @@ def plot_convergence(
     # A cost of 0 has no place on a logarithmic scale.
     shown = np.isfinite(fit.history) & (fit.history > 0.0)
     iterations = np.arange(fit.history.size)[shown]
-    one = "swarm" if fit.swarm is not None else "descent"
+    one = "swarm" if isinstance(fit.method, ParticleSwarm) else "descent"
     best = f"best of {len(fit.runs)} {one}s" if len(fit.runs) > 1 else one
     ax.plot(
         iterations,
@@ -207,7 +208,7 @@ def plot_convergence(
     )
     ends = [(run.nit, 1e6 * run.cost) for run in fit.runs if 0.0 < run.cost < np.inf]
     if len(ends) > 1:
-        refined = fit.npolish and fit.swarm is not None
+        refined = fit.npolish and one == "swarm"
         label = f"each {one}, refined" if refined else f"end of each {one}"
         ax.plot(*zip(*ends, strict=True), **{**MARKS, "marker": "x", "label": label})
     if fit.npolish and fit.cost > 0.0:

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 from ..._support.files import make_folder, picture_files, result_set, save_figures
 from ..._support.units import of_drive, shown_unit
 from ..fitted.notes import start_notes
+from ..methods.descents import Descents
+from ..methods.least_squares import LeastSquares
+from ..methods.particle_swarm import ParticleSwarm
 
 if TYPE_CHECKING:
     import os
@@ -48,10 +51,10 @@ def summary_text(fit: Identification) -> str:
     lines = _of_several(fit) if len(fit.records) > 1 else _of_one(fit)
     if fit.cost_with_priors is not None:
         lines.append(f"      {1e6 * fit.cost_with_priors:.4g} um with the priors was minimised")
-    searched = fit.model.info.searched
-    if searched:
-        iterations = f"{fit.nit} iterations, " if fit.swarm is not None else ""
-        how = f"{iterations}{fit.nfev} simulations, seed {fit.seed}: {fit.message}"
+    searched, method = fit.model.info.searched, fit.method
+    if not isinstance(method, LeastSquares):
+        iterations = f"{fit.nit} iterations, " if isinstance(method, ParticleSwarm) else ""
+        how = f"{iterations}{fit.nfev} simulations, seed {method.seed}: {fit.message}"
         lines += [f"      {how}", *_runs(fit)]
     else:
         lines.append(f"      least squares, {fit.nfev} simulations")
@@ -228,7 +231,7 @@ def _scaled(fit: IdentifiedModel, one: Parameter) -> list[float]:
 def _runs(fit: Identification) -> list[str]:
     """Say whether several runs agree, and what the others found."""
     costs = sorted(1e6 * run.cost for run in fit.runs)
-    if fit.descents is not None:
+    if isinstance(fit.method, Descents):
         text = f"{fit.agreeing} of {len(costs)} descents end within 0.1 % of the lowest cost"
         others = costs[fit.agreeing :]
         if others and others[0] < math.inf:
