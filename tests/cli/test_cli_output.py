@@ -193,7 +193,7 @@ def test_shells_complete_commands_options_and_kinds(shell: str) -> None:
     def completed(*words: str) -> str:
         line = " ".join(["piezotrack", *words])
         environment = {
-            "_piezotrackTRACK_COMPLETE": f"complete_{shell}",
+            "_PIEZOTRACK_COMPLETE": f"complete_{shell}",
             "COMP_WORDS": line,
             "COMP_CWORD": str(len(words)),
             "_TYPER_COMPLETE_ARGS": line,

@@ -180,15 +180,20 @@ TOKENS = st.sampled_from([*OTHERS, *FUNCTIONS, *"()+-*/.e_,;=<>[]'\"\\\n\0", "**
 @example("\ud800")
 @example("__import__('os').system('true')")
 def test_any_text_is_read_or_refused_in_one_sentence(text: str) -> None:
-    for arguments in ({"ties": {"b1": text}}, {"constraints": [text]}, {"scales": {text: "log"}}):
+    for parameters, constraints in (
+        ({"b1": pt.Parameter(tie=text)}, []),
+        ({}, [text]),
+        ({text: pt.Parameter(scale="log")}, []),
+    ):
         try:
             pt.identify(
                 record(),
                 "dahl",
+                parameters=parameters,
+                constraints=constraints,
                 method=replace(FEW, runs=1),
                 threads=1,
                 history="virgin",
-                **arguments,
             )
         except (pt.ParameterError, pt.NumericalError) as error:
             message = str(error)
