@@ -59,7 +59,7 @@ def until_heard(port: int) -> None:
 def test_a_server_without_room_for_a_connection_hears_the_next(
     port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What the system says where too many files are open, for half a second."""
+    """Error of the system where too many files are open, for half a second."""
     accept, refused = socket.socket.accept, [0]
 
     def full(_: socket.socket) -> Any:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
+from .._support.arguments import one_of
 from .._support.arrays import signal_of, time_axis
 from .._support.frames import frame_of
 from .._support.messages import quoted
@@ -118,8 +119,7 @@ class Dataset(Viewed):
         source: str | None = None,
         notes: Sequence[str] = (),
     ) -> None:
-        if hold not in ("foh", "zoh"):
-            raise ParameterError(f"hold is {quoted(hold)}: expected 'foh' or 'zoh'")
+        one_of("hold", hold, ("foh", "zoh"))
         for name, text in (("drive_unit", drive_unit), ("source", source or "")):
             if not isinstance(text, str):
                 raise ParameterError(f"{name} is {quoted(text)}: expected text")

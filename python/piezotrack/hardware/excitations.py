@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.arguments import finite, hertz, plain, positive
+from .._support.arguments import expect, finite, hertz, plain, positive
 from .._support.arrays import check_dt
+from .._support.messages import quoted
 from ..data.reader import read_drive
 from ..errors import ParameterError
 from ..references.parse import Kind, made_from_text
@@ -65,6 +66,11 @@ class Drive:
     duration: float
     at: Callable[[Array], Array]
     frequency: float | None = None
+
+    def __post_init__(self) -> None:
+        expect("name", self.name, str, "a text")
+        if not callable(self.at):
+            raise ParameterError(f"at is {quoted(self.at)}: expected a function of times [s]")
 
     def __repr__(self) -> str:
         return f"Drive({self.name}, {plain(self.duration)} s)"
