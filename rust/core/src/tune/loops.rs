@@ -173,7 +173,7 @@ impl ReadyTask<'_> {
     /// With sampling jitter, and for a stage without lanes, each loop is simulated by itself.
     ///
     /// # Errors
-    /// Those of [`track`], and where memory does not suffice.
+    /// Those of [`crate::simulate::track`], and where memory does not suffice.
     pub fn figures(&self, controllers: &[Controller<Law>], stop: Stop<'_>) -> Result<Vec<Figures>> {
         let motions = self.motions(controllers, false, stop)?;
         Ok(motions.into_iter().map(|motion| motion.figures).collect())
