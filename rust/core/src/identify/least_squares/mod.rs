@@ -19,6 +19,7 @@ mod layout;
 mod modes;
 mod places;
 mod record_path;
+mod refinement;
 mod result;
 mod settings;
 mod slow_parts;

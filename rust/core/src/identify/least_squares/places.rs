@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use super::common::Common;
 use super::fit::Fit;
-use super::settings::{PlacesKind, ROUGH, STEPS, Settings};
+use super::settings::{PlacesKind, ROUGH, SAME, STEPS, Settings};
 use crate::math::on_all_threads;
 use crate::models::{MOST_PLAYS, Places};
 use crate::signal::index;
@@ -141,8 +141,12 @@ pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()
         }
     }
     if let Some(thresholds) = best {
-        fit.restructure(|fit| fit.places = thresholds);
-        fit.settle(ROUGH)?;
+        let mut trial = fit.clone();
+        trial.restructure(|trial| trial.places = thresholds);
+        trial.settle(ROUGH)?;
+        if trial.rms < SAME * fit.rms {
+            *fit = trial;
+        }
     }
     Some(())
 }

@@ -70,3 +70,13 @@ pub(super) const SAME: f64 = 1.01;
 pub(super) const FIRST_SHARE: f64 = 0.005;
 
 pub(super) const MODE_GAIN: f64 = 0.02;
+
+/// Shares of the deviation that a history, creep, a drift and a lag have to take away.
+pub(super) const HISTORY_GAIN: f64 = 0.02;
+pub(super) const CREEP_GAIN: f64 = 0.015;
+pub(super) const DRIFT_GAIN: f64 = 0.015;
+pub(super) const LAG_GAIN: f64 = 0.01;
+
+/// Share of the deviation that a mode has to take away whose resonance no record shows: it would
+/// also explain some of the creep, or of what the plays do not.
+pub(super) const UNSEEN_GAIN: f64 = 0.15;

@@ -8,8 +8,10 @@ use super::form::Form;
 use super::lag::{best_lag, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::places::{add_once, choose_places, few_or_many, spread};
+use super::refinement::Refinement;
 use super::settings::{
-    CreepKind, DynamicsKind, FIRST_SHARE, MODE_GAIN, PlacesKind, ROUGH, SAME, STEPS, Settings,
+    CreepKind, DynamicsKind, FIRST_SHARE, HISTORY_GAIN, MODE_GAIN, PlacesKind, ROUGH, SAME, STEPS,
+    Settings, UNSEEN_GAIN,
 };
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
@@ -25,18 +27,15 @@ const SHAPE_ROUNDS: usize = 20;
 /// middle of its range: what a record does not determine is not changed.
 const SHAPE_GAIN: f64 = 0.1;
 
-/// Shares of the deviation that histories and modes have to take away.
-const HISTORY_GAIN: f64 = 0.02;
-/// Share of the deviation that a mode has to take away whose resonance no record shows, and how far
-/// it is above the drive: it would also explain some of the creep, or of what the plays do not.
-const UNSEEN_GAIN: f64 = 0.15;
+/// How far a mode that no record shows is above the drive.
 const ABOVE_DRIVE: f64 = 10.0;
 
 /// Share of the deviation that dead zones in other places have to take away.
 const CORNER_GAIN: f64 = 0.02;
 
-/// Rows that choices are made on, about.
-const ROWS: usize = 4000;
+/// Rows that choices are made on, about; more where modes ring.
+const ROWS: usize = 1500;
+const EXCITED_ROWS: usize = 4000;
 
 /// Longest interval of a thinned record, as a phase of the drive, rad: its peaks are then known to
 /// a thousandth of the travel.
@@ -78,7 +77,10 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         PlacesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
     };
     let mut fit = Fit::new(common, &places);
-    let every = |one: &WeightsRecord<'_>| one.samples().div_ceil(ROWS);
+    let every = |one: &WeightsRecord<'_>| {
+        let rows = if one.measures().excited().is_some() { EXCITED_ROWS } else { ROWS };
+        one.samples().div_ceil(rows)
+    };
     fit.every = common.records.iter().map(every).collect();
     fit.settle(ROUGH)?;
     search_shape(&mut fit)?;
@@ -89,21 +91,56 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         fit.restructure(|fit| fit.times.clone_from(times));
         fit.settle(ROUGH)?;
     }
-    // With a lag, or what it does would be taken for a history.
-    let lags = matches!(settings.dynamics, DynamicsKind::First | DynamicsKind::Auto) && !mode;
-    if lags {
-        fit = best_lag(&fit)?;
+    let refinement = Refinement { settings, shown: mode };
+    let mut starts = vec![None];
+    if fit.common.records.len() == 1 && fit.common.records[0].history.is_none() {
+        starts.extend([History::Virgin, History::Settled, History::Fitted].map(Some));
     }
-    choose_histories(&mut fit, settings)?;
-    if lags {
-        fit.set_poles(Form::None, &[]);
-        fit.settle(ROUGH)?;
+    let begun =
+        with_each(&starts, |history| with_slow_and_late(&fit, settings, mode, *history))?;
+    let found = with_each(&begun, |start| {
+        let mut trial = start.clone();
+        refinement.refine(&mut trial)?;
+        Some(trial)
+    })?;
+    let better =
+        |a: Fit<'a>, b: Fit<'a>| if refinement.cost(&b) < refinement.cost(&a) { b } else { a };
+    let mut fit = found.into_iter().reduce(better)?;
+    choose_places(&mut fit, settings)?;
+    refinement.refine(&mut fit)?;
+    drop_drifts(&mut fit)?;
+    replace_corners(&mut fit)?;
+    Some(fit)
+}
+
+/// History, creep, drifts and dynamics, one after the other, from a fit with a history that is held,
+/// or is chosen among them.
+fn with_slow_and_late<'a>(
+    from: &Fit<'a>,
+    settings: &Settings,
+    mode: bool,
+    history: Option<History>,
+) -> Option<Fit<'a>> {
+    let mut fit = from.clone();
+    match history {
+        Some(History::Fitted) => fit = fitted_history(&fit, 0)?,
+        Some(history) => fit = with_history(&fit, 0, (history, 0.0), STEPS)?,
+        None => {
+            // With a lag, or what it does would be taken for a history.
+            let lags =
+                matches!(settings.dynamics, DynamicsKind::First | DynamicsKind::Auto) && !mode;
+            if lags {
+                fit = best_lag(&fit)?;
+            }
+            choose_histories(&mut fit, settings)?;
+            if lags {
+                fit.set_poles(Form::None, &[]);
+                fit.settle(ROUGH)?;
+            }
+        }
     }
     choose_slow(&mut fit, settings)?;
     choose_dynamics_and_creep(&mut fit, settings, mode)?;
-    choose_places(&mut fit, settings)?;
-    drop_drifts(&mut fit)?;
-    replace_corners(&mut fit)?;
     Some(fit)
 }
 
@@ -175,7 +212,7 @@ fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
 }
 
 /// The fit with another history of record `r`, as good as it gets.
-fn with_history<'a>(
+pub(super) fn with_history<'a>(
     fit: &Fit<'a>,
     r: usize,
     (history, from): (History, f64),
@@ -197,13 +234,13 @@ fn with_history<'a>(
 }
 
 /// The voltage that the stage came from.
-fn fitted_history<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
+pub(super) fn fitted_history<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
     let drive = fit.common.records[r].drive;
     let (low, high) = range(drive.u);
     let (first, reach) = (drive.u[0], high - low);
     let parts = 16;
     let mut best = with_history(fit, r, (History::Fitted, first), STEPS)?;
-    let mut width = 2.0 * reach / index(parts);
+    let width = 2.0 * reach / index(parts);
     for i in 0..=parts {
         let from = first - reach + width * index(i);
         let trial = with_history(&best, r, (History::Fitted, from), FEW_STEPS)?;
@@ -211,6 +248,12 @@ fn fitted_history<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
             best = trial;
         }
     }
+    nearer(best, r, width)
+}
+
+/// The fit with the voltage that record `r` came from moved within `width`, V, to where it explains
+/// most.
+pub(super) fn nearer<'a>(mut best: Fit<'a>, r: usize, mut width: f64) -> Option<Fit<'a>> {
     for _ in 0..7 {
         width *= 0.5;
         let from = best.begins[r].from;
@@ -334,7 +377,7 @@ fn choose_dynamics(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option
 
 /// Whether what was found as a mode is one: far above the drive, where it does not stand for
 /// what else the record shows at the drive's harmonics.
-fn is_mode(fit: &Fit<'_>) -> bool {
+pub(super) fn is_mode(fit: &Fit<'_>) -> bool {
     let rates = fit.common.records.iter().map(|one| one.measures().frequency);
     let drive = rates.fold(0.0, f64::max) / core::f64::consts::TAU;
     let Some(slot) = fit.layout().poles().next() else { return false };
@@ -342,7 +385,7 @@ fn is_mode(fit: &Fit<'_>) -> bool {
 }
 
 /// A mode that the record does not show: as high and as little damped as the record allows.
-fn unseen_mode<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
+pub(super) fn unseen_mode<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
     let dt = fit.common.shortest_interval();
     let beginnings = [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)];
     let trials = with_each(&beginnings, |(frequency, damping_ratio)| {

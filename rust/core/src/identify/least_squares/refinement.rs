@@ -1,0 +1,319 @@
+//! Refinement of a structure: other histories, creep, drifts and dynamics beside those chosen.
+//!
+//! What is chosen in turn depends on the order: a lag may stand for creep, a history for a drift.
+//! From the structure so far, neighbours in one part, or in two that stand for each other, are
+//! settled side by side, and the one of least cost is taken, until none is better. The cost is the
+//! logarithm of the RMS deviation and, for each part, the share of the deviation that it has to
+//! take away: residuals of models are correlated, so that criteria that count independent samples,
+//! as Akaike's, would take every part.
+
+use super::fit::Fit;
+use super::form::Form;
+use super::lag::best_lag;
+use super::settings::{
+    CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, HISTORY_GAIN, LAG_GAIN, MODE_GAIN, ROUGH,
+    Settings, UNSEEN_GAIN,
+};
+use super::slow_parts::{creeps, with_drift};
+use super::structure_selection::{fitted_history, unseen_mode, is_mode, nearer, with_history};
+use super::trials::{Trial, settled_all, with_each};
+use crate::identify::parameters::drift::{DriftKind, repeats};
+use crate::identify::records::history::History;
+use crate::signal::range;
+
+/// Rounds through all parts, at most.
+const ROUNDS: usize = 4;
+
+/// Least gain of a move: less is chance, and the structure of the moves before stays.
+const LEAST_GAIN: f64 = 3e-3;
+
+/// Steps of a neighbour, how many of the best are settled, and how far above the cost so far these
+/// may be before.
+const FEW_STEPS: usize = 3;
+const SETTLED: usize = 2;
+const WITHIN: f64 = 0.2;
+
+/// Ratios by which time constants of the creep are moved.
+const RATIOS: [f64; 2] = [3.0, 1.5];
+
+/// What a refinement is about.
+pub(super) struct Refinement<'s> {
+    pub settings: &'s Settings,
+    /// Whether a mode was shown by a record.
+    pub shown: bool,
+}
+
+type Way<'t, 'a> = Box<dyn Fn() -> Option<Fit<'a>> + Sync + 't>;
+
+impl Refinement<'_> {
+    /// Penalised cost: logarithm of the RMS deviation and of what each part has to take away.
+    pub fn cost(&self, fit: &Fit<'_>) -> f64 {
+        let mut cost = libm::log(fit.rms);
+        for (r, record) in fit.common.records.iter().enumerate() {
+            if record.history.is_none() && fit.begins[r].history != History::Virgin {
+                cost += HISTORY_GAIN;
+            }
+            if record.drift == DriftKind::Auto && fit.drifts[r].is_some() {
+                cost += DRIFT_GAIN;
+            }
+        }
+        if self.settings.creep == CreepKind::Auto && !fit.times.is_empty() {
+            cost += CREEP_GAIN;
+        }
+        if self.settings.dynamics == DynamicsKind::Auto {
+            cost += match fit.form {
+                Form::None => 0.0,
+                Form::First => LAG_GAIN,
+                Form::Modes(_) if !self.shown => UNSEEN_GAIN,
+                Form::Modes(1) => MODE_GAIN,
+                Form::Modes(_) => 2.0 * MODE_GAIN,
+            };
+        }
+        cost
+    }
+
+    /// Moves to better structures until there is none.
+    pub fn refine(&self, fit: &mut Fit<'_>) -> Option<()> {
+        for _ in 0..ROUNDS {
+            let before = self.cost(fit);
+            self.histories(fit)?;
+            self.slow_and_late(fit)?;
+            self.creep_times(fit)?;
+            self.dynamics(fit)?;
+            if self.cost(fit) > before - LEAST_GAIN {
+                break;
+            }
+        }
+        Some(())
+    }
+
+    /// Takes the best of some ways where it is better than the fit.
+    fn take<'a>(&self, fit: &mut Fit<'a>, ways: &[Way<'_, 'a>]) -> Option<bool> {
+        let trials: Vec<Trial<'_, 'a>> = ways.iter().map(|way| way as Trial<'_, 'a>).collect();
+        let mut tried = settled_all(&trials)?;
+        tried.sort_by(|a, b| self.cost(a).total_cmp(&self.cost(b)));
+        tried.truncate(SETTLED);
+        let mut least = self.cost(fit) - LEAST_GAIN;
+        tried.retain(|trial| self.cost(trial) < least + WITHIN);
+        let settled = with_each(&tried, |trial| {
+            let mut trial = trial.clone();
+            trial.settle(ROUGH)?;
+            Some(trial)
+        })?;
+        let mut better = None;
+        for trial in settled {
+            let cost = self.cost(&trial);
+            if cost < least {
+                (least, better) = (cost, Some(trial));
+            }
+        }
+        let found = better.is_some();
+        if let Some(better) = better {
+            *fit = better;
+        }
+        Some(found)
+    }
+
+    fn histories(&self, fit: &mut Fit<'_>) -> Option<()> {
+        for r in 0..fit.common.records.len() {
+            if fit.common.records[r].history.is_some() {
+                continue;
+            }
+            let from = fit.clone();
+            let mut ways: Vec<Way<'_, '_>> = Vec::new();
+            for history in [History::Virgin, History::Settled] {
+                if from.begins[r].history != history {
+                    let from = &from;
+                    ways.push(Box::new(move || with_history(from, r, (history, 0.0), FEW_STEPS)));
+                }
+            }
+            if from.begins[r].history != History::Fitted {
+                let from = &from;
+                ways.push(Box::new(move || fitted_history(from, r)));
+            } else {
+                let from = &from;
+                let (low, high) = range(from.common.records[r].drive.u);
+                let width = 0.125 * (high - low);
+                ways.push(Box::new(move || nearer(from.clone(), r, width)));
+            }
+            self.take(fit, &ways)?;
+        }
+        Some(())
+    }
+
+    /// Creep, drifts, and a lag, which stand for each other.
+    fn slow_and_late(&self, fit: &mut Fit<'_>) -> Option<()> {
+        let from = fit.clone();
+        let from = &from;
+        let mut ways: Vec<Way<'_, '_>> = Vec::new();
+        let free = self.settings.creep == CreepKind::Auto;
+        let lags = self.settings.dynamics == DynamicsKind::Auto && !matches!(from.form, Form::Modes(_));
+        let mut creep = if free { creeps(from) } else { Vec::new() };
+        if free {
+            creep.push(decades(from));
+            creep.push(Vec::new());
+        }
+        creep.retain(|times| *times != from.times);
+        for times in creep {
+            let none = times.is_empty();
+            let other = times.clone();
+            ways.push(Box::new(move || with_creep(from, &other)));
+            if lags && !none && from.form == Form::First {
+                let other = times.clone();
+                ways.push(Box::new(move || {
+                    let mut bare = from.clone();
+                    bare.set_poles(Form::None, &[]);
+                    with_creep(&bare, &other)
+                }));
+            }
+            if lags && from.form == Form::None && (none || times.len() > 2) {
+                let other = times.clone();
+                ways.push(Box::new(move || best_lag(&with_creep(from, &other)?)));
+            }
+            for r in 0..from.common.records.len() {
+                if from.common.records[r].drift == DriftKind::Auto && from.drifts[r].is_some() {
+                    let other = times.clone();
+                    ways.push(Box::new(move || {
+                        let mut bare = from.clone();
+                        bare.restructure(|bare| bare.drifts[r] = None);
+                        with_creep(&bare, &other)
+                    }));
+                }
+            }
+        }
+        for (r, record) in from.common.records.iter().enumerate() {
+            if record.drift != DriftKind::Auto || !repeats(&record.drive.u[record.start..]) {
+                continue;
+            }
+            if from.drifts[r].is_some() {
+                ways.push(Box::new(move || {
+                    let mut bare = from.clone();
+                    bare.restructure(|bare| bare.drifts[r] = None);
+                    bare.settle(ROUGH)?;
+                    Some(bare)
+                }));
+            } else {
+                ways.push(Box::new(move || {
+                    with_drift(from, r)
+                }));
+                if free && !from.times.is_empty() {
+                    ways.push(Box::new(move || {
+                        with_drift(&with_creep(from, &[])?, r)
+                    }));
+                }
+            }
+        }
+        self.take(fit, &ways)?;
+        Some(())
+    }
+
+    /// Time constants of the creep, moved one at a time and both.
+    fn creep_times(&self, fit: &mut Fit<'_>) -> Option<()> {
+        if self.settings.creep != CreepKind::Auto || fit.times.is_empty() {
+            return Some(());
+        }
+        for ratio in RATIOS {
+            for _ in 0..3 {
+                let from = fit.clone();
+                let from = &from;
+                let mut ways: Vec<Way<'_, '_>> = Vec::new();
+                let count = from.times.len();
+                for part in 0..=count {
+                    for factor in [ratio, 1.0 / ratio] {
+                        let mut times = from.times.clone();
+                        for (i, time) in times.iter_mut().enumerate() {
+                            if part == count || part == i {
+                                *time *= factor;
+                            }
+                        }
+                        if times.windows(2).any(|pair| pair[1] < 1.4 * pair[0])
+                            || times[0] < 3.0 * from.common.shortest_interval()
+                        {
+                            continue;
+                        }
+                        ways.push(Box::new(move || with_times(from, &times)));
+                    }
+                }
+                if !self.take(fit, &ways)? {
+                    break;
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn dynamics(&self, fit: &mut Fit<'_>) -> Option<()> {
+        if self.settings.dynamics != DynamicsKind::Auto {
+            return Some(());
+        }
+        let from = fit.clone();
+        let mut still = from.clone();
+        still.set_poles(Form::None, &[]);
+        let (from, still) = (&from, &still);
+        let mut ways: Vec<Way<'_, '_>> = Vec::new();
+        if from.form != Form::None {
+            ways.push(Box::new(move || {
+                let mut still = still.clone();
+                still.settle(ROUGH)?;
+                Some(still)
+            }));
+        }
+        if from.form != Form::First {
+            ways.push(Box::new(move || best_lag(still)));
+        }
+        if !matches!(from.form, Form::Modes(_)) {
+            ways.push(Box::new(move || {
+                let hidden = unseen_mode(still)?;
+                Some(if is_mode(&hidden) { hidden } else { still.clone() })
+            }));
+        }
+        if let Form::Modes(count @ 2..) = from.form {
+            ways.push(Box::new(move || {
+                let mut trial = from.clone();
+                let poles = from.x[from.layout().poles()].to_vec();
+                let fewer = Form::Modes(count - 1);
+                trial.set_poles(fewer, &poles[..fewer.numbers()]);
+                trial.settle(ROUGH)?;
+                Some(trial)
+            }));
+        }
+        self.take(fit, &ways)?;
+        Some(())
+    }
+}
+
+/// Time constants of one relaxation a decade, s.
+fn decades(fit: &Fit<'_>) -> Vec<f64> {
+    let record = fit.common.longest();
+    let (shortest, longest) = (10.0 * record.drive.dt, 0.5 * record.length());
+    let mut times = Vec::new();
+    let mut time = longest;
+    while time >= shortest && times.len() < 6 {
+        times.push(time);
+        time /= 10.0;
+    }
+    times.reverse();
+    times
+}
+
+/// The fit with relaxations of these time constants, s, as good as it gets.
+fn with_creep<'a>(from: &Fit<'a>, times: &[f64]) -> Option<Fit<'a>> {
+    let mut trial = from.clone();
+    trial.restructure(|trial| trial.times = times.to_vec());
+    for share in trial.layout().shares() {
+        trial.x[share] = FIRST_SHARE;
+    }
+    trial.settle_rigid(FEW_STEPS)?;
+    Some(trial)
+}
+
+/// The same with the weights of the relaxations kept.
+fn with_times<'a>(from: &Fit<'a>, times: &[f64]) -> Option<Fit<'a>> {
+    let mut trial = from.clone();
+    let shares = from.x[from.layout().shares()].to_vec();
+    trial.restructure(|trial| trial.times = times.to_vec());
+    let slots = trial.layout().shares();
+    trial.x[slots].copy_from_slice(&shares);
+    trial.settle_rigid(FEW_STEPS)?;
+    Some(trial)
+}
