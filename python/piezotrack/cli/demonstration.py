@@ -13,7 +13,7 @@ from ..data.dataset import Dataset
 from ..identification.fit import identify
 from ..identification.methods.descents import Descents
 from ..references.waveforms import triangle
-from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ..stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from ..control.controller.controller import Controller
 from ..control.timing import Timing
 from ..errors import ParameterError
 from ..stages.apparatus import Amplifier, Preconditioning, Sensor
-from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ..stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
 from ..stages.xy import XYStage
 

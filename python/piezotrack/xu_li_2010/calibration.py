@@ -16,7 +16,7 @@ from ..errors import PiezotrackError
 from ..identification.fit import identify
 from ..identification.methods.descents import Descents
 from ..identification.methods.particle_swarm import ParticleSwarm
-from ..stages.dahl import DahlStage
+from ..stages.feedback.dahl import DahlStage
 from . import fig_04_step_test, fig_06_identification, fig_12_14_tracking, fig_15_circles
 from .apparatus import loop
 from .free_parameters import FREE, SEED, Free, apparatus_at, theta_at

@@ -14,7 +14,7 @@ from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
 from ..identification.fit import identify
 from ..identification.methods.descents import Descents
-from ..stages.dahl import DahlStage
+from ..stages.feedback.dahl import DahlStage
 from . import fig_06_identification, fig_07_model_comparison, fig_12_14_tracking
 from .apparatus import DT, loop
 from .references import HIGH, LOW, RANGE, fast, slow

@@ -9,7 +9,7 @@ import numpy as np
 from ..data.dataset import Dataset
 from ..identification.fit import identify
 from ..identification.methods.particle_swarm import ParticleSwarm
-from ..stages.dahl import DahlStage
+from ..stages.feedback.dahl import DahlStage
 from .procedure import FITTED_SECONDS, SEARCH_BOX
 
 if TYPE_CHECKING:

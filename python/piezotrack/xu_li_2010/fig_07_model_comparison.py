@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..identification.comparison.compare import Comparison, compare
 from ..identification.fit import identify
 from ..identification.methods.descents import Descents
-from ..stages.bouc_wen import BoucWenStage
+from ..stages.input.bouc_wen import BoucWenStage
 from .fig_06_identification import thinned
 from .procedure import FITTED_SECONDS
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..identification.experiments.step_readings import StepReadings
-from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ..stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
 from ..stages.xy import XYStage
 from . import fig_04_step_test

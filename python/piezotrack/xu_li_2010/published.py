@@ -11,7 +11,7 @@ import numpy as np
 
 from .._support.json_text import parse_json
 from ..identification.experiments.step_readings import StepReadings
-from ..stages.dahl import DahlStage
+from ..stages.feedback.dahl import DahlStage
 from .table_2 import PUBLISHED, Published
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ... import _core
 from ...errors import ParameterError
-from ...stages.dahl import DahlStage
+from ...stages.feedback.dahl import DahlStage
 from ..controller.controller import Controller
 from ..laws.hysteresis_observer import HysteresisObserver
 from ..laws.neural_network import train_network

@@ -13,7 +13,7 @@ from ..._support.messages import quoted
 from ..._support.result import Result
 from ...data.dataset import Dataset
 from ...errors import ParameterError
-from ...stages.dahl import DahlStage
+from ...stages.feedback.dahl import DahlStage
 from .step_readings import StepReadings
 
 if TYPE_CHECKING:

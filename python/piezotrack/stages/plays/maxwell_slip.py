@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .. import _core
-from .base import Stage, stage
+from ... import _core
+from ..base import Stage, stage
 from .prandtl_ishlinskii import PrandtlIshlinskiiState
 
 __all__ = ["MaxwellSlipStage"]

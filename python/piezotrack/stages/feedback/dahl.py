@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from .base import Stage, mechanical_ratios, stage
-from .motion import Response, StageState
+from ..base import Stage, mechanical_ratios, stage
+from ..motion import Response, StageState
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike
 
-    from ..data.dataset import Hold
-    from .base import Ratio
+    from ...data.dataset import Hold
+    from ..base import Ratio
 
 __all__ = ["DahlStage", "DahlState"]
 

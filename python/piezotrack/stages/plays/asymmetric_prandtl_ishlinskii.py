@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .base import Stage, stage
+from ..base import Stage, stage
 from .prandtl_ishlinskii import PrandtlIshlinskiiState
 
 __all__ = ["AsymmetricPrandtlIshlinskiiStage"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .base import Stage, stage
-from .motion import Response, StageState
+from ..base import Stage, stage
+from ..motion import Response, StageState
 
 if TYPE_CHECKING:
     from collections.abc import Callable

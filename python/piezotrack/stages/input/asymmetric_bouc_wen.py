@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .base import Stage, mechanical_ratios, stage
+from ..base import Stage, mechanical_ratios, stage
 from .bouc_wen import BoucWenState
 
 if TYPE_CHECKING:
-    from .base import Ratio
+    from ..base import Ratio
 
 __all__ = ["AsymmetricBoucWenStage"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .base import Stage, stage
-from .motion import StageState
+from ..base import Stage, stage
+from ..motion import StageState
 
 __all__ = ["DuhemStage", "DuhemState"]
 

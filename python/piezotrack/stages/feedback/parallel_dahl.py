@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .base import Stage, mechanical_ratios, stage
-from .motion import StageState
+from ..base import Stage, mechanical_ratios, stage
+from ..motion import StageState
 
 if TYPE_CHECKING:
-    from .base import Ratio
+    from ..base import Ratio
 
 __all__ = ["ParallelDahlStage", "ParallelDahlState"]
 
