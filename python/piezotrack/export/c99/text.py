@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..errors import ParameterError
+from ...errors import ParameterError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -155,7 +155,7 @@ def literal(value: float, name: str, *, single: bool) -> str:
 
     Examples
     --------
-    >>> from piezotrack.export.c_text import literal
+    >>> from piezotrack.export.c99.text import literal
     >>> literal(0.1, "GAIN", single=False)
     '0x1.999999999999ap-4 /* 0.1 */'
     >>> literal(0.1, "GAIN", single=True)

@@ -6,22 +6,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.arrays import signal_of
-from .._support.units import of_drive
-from ..control.laws.neural_network import NetworkInverse
-from ..control.loop.preconditions import check_period, check_turns
-from ..errors import DataError, ParameterError, ShapeError
-from . import c_dahl, c_input, c_inverse, c_laws, c_loop
-from .c_repetitive import repetitive
+from ..._support.arrays import signal_of
+from ..._support.units import of_drive
+from ...control.laws.neural_network import NetworkInverse
+from ...control.loop.preconditions import check_period, check_turns
+from ...errors import DataError, ParameterError, ShapeError
+from .dahl import dahl_observer
+from .input import filters, helpers, readings
+from .inverse import dahl_inverse, voltage_table
+from .laws import disturbance_observer, pid, sliding_mode, state_space
+from .loop import Shape, loop, sample
+from .repetitive import repetitive
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
-    from ..control.controller.controller import Controller
-    from ..references.reference import Reference
-    from .c_text import Part
+    from ...control.controller.controller import Controller
+    from ...references.reference import Reference
+    from .text import Part
 
 __all__ = ["coefficients_of", "feedforward_table", "parts_of", "shape_of"]
 
@@ -122,7 +126,7 @@ def _given_table(controller: Controller, given: ArrayLike) -> list[float]:
     return [float(one) for one in table]
 
 
-def shape_of(controller: Controller, table: Sequence[float] | None) -> c_loop.Shape:
+def shape_of(controller: Controller, table: Sequence[float] | None) -> Shape:
     """Tell which parts there are.
 
     Raises
@@ -138,7 +142,7 @@ def shape_of(controller: Controller, table: Sequence[float] | None) -> c_loop.Sh
     elif controller.feedforward is not None:
         _check_online(controller)
         forward = "online"
-    return c_loop.Shape(
+    return Shape(
         law=name,
         sample=told,
         repeats=learner is not None,
@@ -213,37 +217,37 @@ def parts_of(
         unit = "N"
     shape = shape_of(controller, table)
     low, high = numbers["span"]
-    parts = [c_input.readings(low, high, controller.max_jump)]
+    parts = [readings(low, high, controller.max_jump)]
     if shape.filtered:
-        parts.append(c_input.filters(numbers["filters"]))
+        parts.append(filters(numbers["filters"]))
     if shape.law:
-        parts += [c_loop.sample(shape), *_laws(numbers, unit)]
+        parts += [sample(shape), *_laws(numbers, unit)]
     if shape.repeats:
         parts.append(repetitive(numbers, unit))
     if table is not None:
-        parts.append(c_inverse.table(table, unit))
+        parts.append(voltage_table(table, unit))
     elif shape.forward == "online":
         inverse = controller.feedforward
         assert inverse is not None
         own = inverse._begun(controller.dt).coefficients()
         assert own is not None
         settings = (float(controller.dt), float(inverse.offset), float(inverse.delay))
-        parts.append(c_inverse.dahl_inverse(own, *settings, unit, single=single))
-    parts.append(c_loop.loop(controller.limits, unit, shape))
+        parts.append(dahl_inverse(own, *settings, unit, single=single))
+    parts.append(loop(controller.limits, unit, shape))
     others = "".join(one.code for one in parts)
-    return c_input.helpers(controller.limits, unit, others, single=single), *parts
+    return helpers(controller.limits, unit, others, single=single), *parts
 
 
 def _laws(numbers: Numbers, unit: str) -> list[Part]:
     """Make the parts of the feedback law, the inner one first."""
     if "b" in numbers:
-        return [c_laws.state_space(numbers, unit)]
-    inner, name = c_laws.pid, "pid"
+        return [state_space(numbers, unit)]
+    inner, name = pid, "pid"
     if "sliding-mode" in numbers:
-        inner, name = c_laws.sliding_mode, "sliding"
+        inner, name = sliding_mode, "sliding"
     laws = [inner(numbers, unit)]
     if "disturbance-observer" in numbers:
-        laws.append(c_laws.disturbance_observer(numbers, unit, name))
+        laws.append(disturbance_observer(numbers, unit, name))
     if "dahl-observer" in numbers:
-        laws.append(c_dahl.dahl_observer(numbers, unit))
+        laws.append(dahl_observer(numbers, unit))
     return laws

@@ -14,15 +14,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 from xml.sax.saxutils import quoteattr
 
-from .. import _core
-from .._support.messages import quoted
-from ..errors import DataError, ParameterError
-from .c_text import named
-from .fmu_source import FMU_CODE, FORWARD_INPUT
+from ... import _core
+from ..._support.messages import quoted
+from ...errors import DataError, ParameterError
+from ..c99.text import named
+from .functions import FMU_CODE, FORWARD_INPUT
 
 if TYPE_CHECKING:
-    from ..control.controller.controller import Controller
-    from .c99 import Sources
+    from ...control.controller.controller import Controller
+    from ..c99.sources import Sources
 
 __all__ = ["FLAGS", "compiler", "fmu_bytes"]
 
@@ -46,7 +46,7 @@ class Variable(NamedTuple):
 
 
 def variables(forward: str, unit: str) -> list[Variable]:
-    """List the variables; fmu_source has the same value references."""
+    """List the variables; `functions` has the same value references."""
     third = []
     if forward in FORWARD_INPUT:
         name, text = FORWARD_INPUT[forward]

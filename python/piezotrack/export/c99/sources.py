@@ -6,18 +6,18 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from .. import _core
-from .._support.arguments import expect
-from ..errors import ParameterError
-from .c_check import check_code
-from .c_parts import parts_of, shape_of
-from .c_text import Operations, constant_text, field_text, in_order, named_in, state_bytes
-from .vectors import STEPS, rows_of, vectors_text
+from ... import _core
+from ..._support.arguments import expect
+from ...errors import ParameterError
+from ..vectors import STEPS, rows_of, vectors_text
+from .check import check_code
+from .parts import parts_of, shape_of
+from .text import Operations, constant_text, field_text, in_order, named_in, state_bytes
 
 if TYPE_CHECKING:
-    from ..control.controller.controller import Controller
-    from ..references.reference import Reference
-    from .c_text import Part
+    from ...control.controller.controller import Controller
+    from ...references.reference import Reference
+    from .text import Part
 
 __all__ = ["Sources", "c_sources", "checked_name"]
 

@@ -6,20 +6,20 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
-from .c_dahl import along_operations, dahl_operator
-from .c_text import Constant, Field, Operations, Part
+from .dahl import along_operations, dahl_operator
+from .text import Constant, Field, Operations, Part
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-__all__ = ["dahl_inverse", "table"]
+__all__ = ["dahl_inverse", "voltage_table"]
 
 # As in rust/control/src/inverse: terms of the series, pieces of a way.
 TERMS = 4
 MOST_PIECES = 2000.0
 
 
-def table(voltages: Sequence[float], unit: str) -> Part:
+def voltage_table(voltages: Sequence[float], unit: str) -> Part:
     """Make a feedforward that is played from a table of one period."""
     count = len(voltages)
     return Part(

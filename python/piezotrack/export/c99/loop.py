@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .c_text import Constant, Field, Operations, Part
+from .text import Constant, Field, Operations, Part
 
 __all__ = ["Shape", "loop", "sample"]
 

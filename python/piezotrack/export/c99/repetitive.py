@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .c_text import Constant, Field, Operations, Part
+from .text import Constant, Field, Operations, Part
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
