@@ -26,7 +26,7 @@ from .control.running.track import track as track
 from .control.timing import Timing as Timing
 from .control.tuning.goal import Goal as Goal
 from .control.tuning.goal import TuningSearch as TuningSearch
-from .control.tuning.linear_systems import to_control as to_control
+from .control.tuning.linear.systems import to_control as to_control
 from .control.tuning.margins import Margins as Margins
 from .control.tuning.margins import Spread as Spread
 from .control.tuning.schedule import schedule as schedule

@@ -16,7 +16,7 @@ from ..laws.neural_network import train_network
 from ..learning.learn import learn
 from ..loop.tracking import can_be_learnt
 from ..tuning.goal import Goal
-from ..tuning.h_infinity import mixed_sensitivity
+from ..tuning.linear.h_infinity import mixed_sensitivity
 from ..tuning.margins import Margins, Spread, plants_of
 from ..tuning.schedule import schedule
 from ..tuning.tune import tune

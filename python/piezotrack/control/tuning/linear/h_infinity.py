@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ... import _core
-from ..._support.arguments import not_negative, number_pair, positive
-from ..._support.arrays import check_dt
-from ...errors import NumericalError, ParameterError
-from ...identification.fitted.identified_model import IdentifiedModel
-from ..controller.controller import Controller
-from ..laws.state_space import StateSpace
-from ..plant import linearised_plants, plant_of
-from .linear_systems import sampled
+from .... import _core
+from ...._support.arguments import not_negative, number_pair, positive
+from ...._support.arrays import check_dt
+from ....errors import NumericalError, ParameterError
+from ....identification.fitted.identified_model import IdentifiedModel
+from ...controller.controller import Controller
+from ...laws.state_space import StateSpace
+from ...plant import linearised_plants, plant_of
+from .systems import sampled
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..plant import Plant
+    from ...plant import Plant
 
     Array = NDArray[np.float64]
     Matrices = tuple[Array, Array, Array, Array]

@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..._support.arguments import not_negative, number_pair, one_of
-from ..._support.arrays import check_dt
-from ...errors import ParameterError
-from ...identification.fitted.identified_model import IdentifiedModel
-from ...stages.base import Stage
-from ...stages.virtual import VirtualStage
-from ..controller.controller import Controller
-from ..parts.part import FeedbackLaw
-from ..plant import linearised_plants, plant_of
+from ...._support.arguments import not_negative, number_pair, one_of
+from ...._support.arrays import check_dt
+from ....errors import ParameterError
+from ....identification.fitted.identified_model import IdentifiedModel
+from ....stages.base import Stage
+from ....stages.virtual import VirtualStage
+from ...controller.controller import Controller
+from ...parts.part import FeedbackLaw
+from ...plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:
-    from ..plant import Plant
+    from ...plant import Plant
 
 __all__ = ["sampled", "to_control"]
 
