@@ -18,7 +18,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from .source import Source
+    from ..source import Source
 
 __all__ = ["Variable", "read_variables"]
 

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..._support.arrays import UNEVEN
-from ..columns import Column, Columns
-from ..text_fields import number_of
-from .table import Channel, ChannelTable, Format
-from .text import Layout, TextTable, lines_of
+from ...._support.arrays import UNEVEN
+from ...columns import Column, Columns
+from ...text_fields import number_of
+from ..table import Channel, ChannelTable, Format
+from .delimited import Layout, TextTable, lines_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from .source import Source
+    from ..source import Source
 
 __all__ = ["FORMAT"]
 

@@ -10,13 +10,13 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from ..columns import Columns
-from ..text_fields import number_of, split_fields
-from .table import MOST_COLUMNS, Format
-from .text import Layout, TextTable, lines_of
+from ...columns import Columns
+from ...text_fields import number_of, split_fields
+from ..table import MOST_COLUMNS, Format
+from .delimited import Layout, TextTable, lines_of
 
 if TYPE_CHECKING:
-    from .source import Source
+    from ..source import Source
 
 __all__ = ["FORMAT"]
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .table import Channel, ChannelTable, Format
+from ..table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from .source import Source
+    from ..source import Source
 
 __all__ = ["FORMAT"]
 

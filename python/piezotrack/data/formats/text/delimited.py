@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._support.messages import quoted
-from ..columns import Columns
-from ..text_fields import are_titles, delimiter_of, field_fault, number_of, split_fields
+from ...._support.messages import quoted
+from ...columns import Columns
+from ...text_fields import are_titles, delimiter_of, field_fault, number_of, split_fields
+from ..table import MOST_COLUMNS, Format, Table
 from .dates import instant_of, is_ambiguous
-from .table import MOST_COLUMNS, Format, Table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ..columns import Column
+    from ...columns import Column
+    from ..source import Source
+    from ..table import WrittenColumn
     from .dates import Instant
-    from .source import Source
-    from .table import WrittenColumn
 
     Array = NDArray[np.float64]
 

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..._support.units import split_unit
+from ...._support.units import split_unit
+from ..table import Channel, ChannelTable, Format, split_matrix
 from . import hdf5
 from .mat_elements import Variable, read_variables
-from .table import Channel, ChannelTable, Format, split_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from .source import Source
-    from .table import WrittenColumn
+    from ..source import Source
+    from ..table import WrittenColumn
 
 __all__ = ["FORMAT"]
 

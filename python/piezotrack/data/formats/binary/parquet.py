@@ -5,14 +5,14 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from .table import Channel, ChannelTable, Format
+from ..table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from .source import Source
-    from .table import WrittenColumn
+    from ..source import Source
+    from ..table import WrittenColumn
 
 __all__ = ["FORMAT"]
 
@@ -67,7 +67,7 @@ def _writes(path: Path, columns: Sequence[WrittenColumn]) -> None:
         import pyarrow as arrow
         import pyarrow.parquet as parquet
     except ImportError:
-        from ...errors import DataError
+        from ....errors import DataError
 
         raise DataError(
             f"{path.suffix} is written with pyarrow, which is not installed: expected "

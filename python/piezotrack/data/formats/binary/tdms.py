@@ -6,13 +6,13 @@ from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from ..._support.messages import listed
-from .table import Channel, ChannelTable, Format
+from ...._support.messages import listed
+from ..table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from .source import Source
+    from ..source import Source
 
 __all__ = ["FORMAT"]
 

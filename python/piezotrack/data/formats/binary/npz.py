@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .table import Channel, ChannelTable, Format, split_matrix
+from ..table import Channel, ChannelTable, Format, split_matrix
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from .source import Source
-    from .table import WrittenColumn
+    from ..source import Source
+    from ..table import WrittenColumn
 
 __all__ = ["FORMAT", "NPY"]
 

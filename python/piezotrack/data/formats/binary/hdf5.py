@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..table import Channel, ChannelTable, Format, names_interval, split_matrix, stated_interval
 from .hdf5_heaps import check_heaps
-from .table import Channel, ChannelTable, Format, names_interval, split_matrix, stated_interval
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from .source import Source
+    from ..source import Source
 
 __all__ = ["FORMAT", "open_matlab"]
 

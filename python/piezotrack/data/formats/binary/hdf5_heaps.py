@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from .source import Source
+    from ..source import Source
 
 __all__ = ["check_heaps"]
 

@@ -8,13 +8,13 @@ from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from ..._support.messages import quoted
-from .table import Channel, ChannelTable, Format
+from ...._support.messages import quoted
+from ..table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from .source import Source
+    from ..source import Source
 
 __all__ = ["FORMAT"]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from .table import Format
-from .text import Layout, TextTable, lines_of
+from ..table import Format
+from .delimited import Layout, TextTable, lines_of
 
 if TYPE_CHECKING:
-    from .source import Source
+    from ..source import Source
 
 __all__ = ["FORMAT"]
 
