@@ -128,7 +128,7 @@ def campaign_command(
     quiet: Quiet = False,
 ) -> None:
     """Identify models of many logs; run again for the rest."""
-    from .._support.files import save_figures
+    from .._support.files.writing import save_figures
     from ..identification.campaigns.campaign import campaign
     from ..identification.campaigns.result import check_parquet
 

@@ -72,7 +72,7 @@ def compare_controllers_command(
     quiet: Quiet = False,
 ) -> None:
     """Compare controllers on one stage."""
-    from .._support.files import picture_files
+    from .._support.files.writing import picture_files
     from ..control.comparing.compare import compare_controllers
     from ..control.timing import Timing
     from ..control.tuning.goal import TuningSearch

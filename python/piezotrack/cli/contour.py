@@ -275,7 +275,7 @@ def _cross_talk(stage: XYStage, loops: tuple[Controller, Controller]) -> CrossTa
 
 def _names(table_2: bool) -> list[str]:
     """Files that the command writes."""
-    from .._support.files import picture_files
+    from .._support.files.writing import picture_files
     from ..xu_li_2010.table_2 import PUBLISHED
 
     if not table_2:
@@ -311,7 +311,7 @@ def _write_table(table: Table2, out: Path) -> list[Path]:
     """Write the table with published and obtained values, and the pictures."""
     import numpy as np
 
-    from .._support.files import make_folder, result_set, save_figures, write_columns
+    from .._support.files.writing import make_folder, result_set, save_figures, write_columns
     from ..xu_li_2010.table_2 import PUBLISHED
 
     columns = {

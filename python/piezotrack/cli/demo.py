@@ -44,7 +44,7 @@ def demo_command(
 
 def _measured(result: Output, seed: int) -> None:
     """Run the demonstration on the two measured logs of the package."""
-    from .._support.files import make_folder, picture_files, result_set, save_figures
+    from .._support.files.writing import make_folder, picture_files, result_set, save_figures
     from ..data.log_file import write_log
     from ..identification.views.plot import plot_loop, plot_time, what_was_shown
     from ..identification.views.report import identification_files, save_identification
@@ -112,7 +112,7 @@ def _commands(out: Path) -> list[str]:
 
 def _paper(result: Output, seed: int) -> None:
     """Run the demonstration of the paper: its stage, simulated, and its model."""
-    from .._support.files import make_folder, picture_files, result_set, save_figures
+    from .._support.files.writing import make_folder, picture_files, result_set, save_figures
     from ..data.log_file import write_log
     from ..identification.views.report import identification_files, save_identification
     from ..xu_li_2010.demo import demo_log, identify_demo, track_demo

@@ -207,7 +207,7 @@ def _files(
     kinds: Kinds, logs: list[Dataset], options: FitOptions, *, validated: bool
 ) -> Iterator[str]:
     """Names of all files that the command may write."""
-    from .._support.files import picture_files
+    from .._support.files.writing import picture_files
     from ..identification.solve.selection import models_tried
     from ..identification.views.report import identification_files
 
@@ -227,7 +227,7 @@ def _partial(model: str) -> str:
 
 def _search(records: list[Record], out: Path, kind: str, **arguments: Any) -> Identification:
     """Identify; on Ctrl-C save the best model found so far."""
-    from .._support.files import make_folder
+    from .._support.files.writing import make_folder
     from ..identification.fit import identify
 
     try:
@@ -259,7 +259,7 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
 
 def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]:
     """Write the model and the pictures, those of a second log too."""
-    from .._support.files import make_folder, result_set, save_figures
+    from .._support.files.writing import make_folder, result_set, save_figures
     from ..identification.views.plot import plot_loop, plot_time, what_was_shown
     from ..identification.views.report import save_identification
 

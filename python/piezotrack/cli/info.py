@@ -34,7 +34,7 @@ def info_command(
     Columns, units, ranges, rate, gaps, where the drive rests and reverses, and which models such a
     record can determine.
     """
-    from .._support.files import json_ready
+    from .._support.files.writing import json_ready
     from ..data.log_info import info
     from .advice import as_options
 

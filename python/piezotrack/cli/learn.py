@@ -127,7 +127,7 @@ def learn_command(
     quiet: Quiet = False,
 ) -> None:
     """Learn the voltage of a repeated motion."""
-    from .._support.files import picture_files
+    from .._support.files.writing import picture_files
     from ..control.controller.controller import Controller
     from ..control.learning.learn import learn
     from ..control.timing import Timing
@@ -216,7 +216,7 @@ def _within(
 
 def _write(found: Learning, out: Path, picture: bool) -> list[Path]:
     """Write the table and, where it is asked for, the picture."""
-    from .._support.files import make_folder, result_set, save_figures
+    from .._support.files.writing import make_folder, result_set, save_figures
 
     with result_set(make_folder(out.parent)) as folder:
         written = [found.save(folder / out.name)]

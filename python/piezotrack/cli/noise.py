@@ -48,7 +48,7 @@ def noise_command(
 
     Its rms, resolution and spectrum, and a model of it.
     """
-    from .._support.files import picture_files
+    from .._support.files.writing import picture_files
     from ..data.reader import read_displacement
     from ..identification.experiments.sensor_noise import identify_noise
 

@@ -41,7 +41,7 @@ def play_command(
     quiet: Quiet = False,
 ) -> None:
     """Play a feedforward as a table on a device."""
-    from .._support.files import picture_files
+    from .._support.files.writing import picture_files
     from ..control.controller.load import load_controller
     from ..control.on_device.playing import play
     from ..identification.fitted.model_file import load

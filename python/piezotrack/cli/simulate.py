@@ -43,7 +43,7 @@ def simulate_command(
     quiet: Quiet = False,
 ) -> None:
     """Simulate the response of a model to a drive."""
-    from .._support.files import (
+    from .._support.files.writing import (
         make_folder,
         picture_files,
         result_set,

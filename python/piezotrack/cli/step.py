@@ -65,7 +65,7 @@ def step_command(
 
     And the hysteresis parameters of the Dahl model, as in section 3.3 of Xu and Li 2010.
     """
-    from .._support.files import picture_files
+    from .._support.files.writing import picture_files
     from ..identification.experiments.step_response import identify_step
 
     log = Columns(time, drive, displacement, unit, dt).read(file, hold, resample)

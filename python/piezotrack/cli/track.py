@@ -149,7 +149,7 @@ def track_command(
     quiet: Quiet = False,
 ) -> None:
     """Track a reference in closed loop."""
-    from .._support.files import picture_files
+    from .._support.files.writing import picture_files
     from ..control.controller.controller import Controller
     from ..control.loop.stability import check_loop
     from ..control.running.track import track
@@ -226,7 +226,7 @@ def _on_device(
     unstable: bool,
 ) -> None:
     """Close the loop of a controller file on a device; what was tracked before a fault is kept."""
-    from .._support.files import picture_files
+    from .._support.files.writing import picture_files
     from ..control.controller.load import load_controller
     from ..control.running.track import track
 
@@ -275,7 +275,13 @@ def feedforward_command(
     quiet: Quiet = False,
 ) -> None:
     """Compute the feedforward voltage for a reference."""
-    from .._support.files import make_folder, picture_files, result_set, save_figures, write_columns
+    from .._support.files.writing import (
+        make_folder,
+        picture_files,
+        result_set,
+        save_figures,
+        write_columns,
+    )
     from .._support.units import drive_word, shown_unit
     from ..control.loop.preconditions import check_within_reach
     from ..control.plant import plant_of

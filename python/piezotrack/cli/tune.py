@@ -86,7 +86,7 @@ def tune_command(
     quiet: Quiet = False,
 ) -> None:
     """Find the gains of a controller under margins."""
-    from .._support.files import picture_files
+    from .._support.files.writing import picture_files
     from ..control.timing import Timing
     from ..control.tuning.goal import Goal, TuningSearch
     from ..control.tuning.margins import Margins, Spread
@@ -182,7 +182,7 @@ def _document(tuned: Tuned) -> dict[str, Any]:
 
 def _write(tuned: Tuned, document: dict[str, Any], out: Path) -> list[Path]:
     """Write report and controller as JSON, and a picture of the loop along each reference."""
-    from .._support.files import make_folder, result_set, save_figures, write_document
+    from .._support.files.writing import make_folder, result_set, save_figures, write_document
 
     with result_set(make_folder(out)) as folder:
         pictures = {_name(i): run.plot() for i, run in enumerate(tuned.report.runs)}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from .. import _core
 from .._support.arguments import expect, one_of
-from .._support.files import make_folder, replacing, result_set, write_document
+from .._support.files.writing import make_folder, replacing, result_set, write_document
 from ..control.controller.controller import Controller
 from ..errors import ParameterError
 from ..references.reference import Reference

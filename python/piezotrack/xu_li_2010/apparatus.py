@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-from .._support.json_text import parse_json
+from .._support.files.json_text import parse_json
 from .._support.messages import quoted
 from ..control.controller.controller import Controller
 from ..control.timing import Timing

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .._support.json_text import parse_json
+from .._support.files.json_text import parse_json
 from ..identification.experiments.step_readings import StepReadings
 from ..stages.feedback.dahl import DahlStage
 from .table_2 import PUBLISHED, Published

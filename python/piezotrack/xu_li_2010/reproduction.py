@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from .. import _core
-from .._support.progress_bar import ProgressBar
-from .._support.result import Result
+from .._support.display.progress_bar import ProgressBar
+from .._support.display.result import Result
 from .._support.two_threads import one_by_one, two_threads
 from ..errors import ParameterError
 from .apparatus import Apparatus, calibration_file

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from .._support.result import Result
+from .._support.display.result import Result
 from ..control.loop.contouring import Contour, contour
 from ..references.paths import circle
 

@@ -6,8 +6,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..._support.plot_style import GUIDE, MARKS, MEASURED, MODELS, heading, legend_inside, whole
-from ..._support.plot_style import panels as sheet
+from ..._support.display.plot_style import (
+    GUIDE,
+    MARKS,
+    MEASURED,
+    MODELS,
+    heading,
+    legend_inside,
+    whole,
+)
+from ..._support.display.plot_style import panels as sheet
 from ..references import RULES
 from . import block_diagrams
 

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import DataError
-from .arguments import expect
-from .plot_style import without_glyph_warnings
-from .result_files import MARKER, current_set, finish_others, result_set
+from ...errors import DataError
+from ..arguments import expect
+from ..display.plot_style import without_glyph_warnings
+from .sets import MARKER, current_set, finish_others, result_set
 from .temporary import create, forget
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from ..errors import DataError
+from ...errors import DataError
 from .temporary import create, forget, is_temporary, may_run, sweep, this_host
 
 if TYPE_CHECKING:

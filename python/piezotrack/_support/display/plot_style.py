@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ParameterError
-from .arguments import expect, has_entries
-from .messages import quoted
+from ...errors import ParameterError
+from ..arguments import expect, has_entries
+from ..messages import quoted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
