@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from ..identification.experiments.cross_talk import CrossTalk
     from ..references.xy_reference import XYReference
     from ..stages.xy import XYStage
-    from ..xu_li_2010.table_2 import Published, Table2
+    from ..xu_li_2010.experiments.table_2 import Published, Table2
 
 __all__ = ["contour_command"]
 
@@ -136,7 +136,7 @@ def contour_command(
     """Simulate contouring of a path with an XY stage."""
     from ..control.loop.contouring import contour
     from ..control.timing import Timing
-    from ..xu_li_2010.table_2 import run_table_2
+    from ..xu_li_2010.experiments.table_2 import run_table_2
 
     own = _is_own(stage, models, table_2)
     gains = _gains(kp)
@@ -276,7 +276,7 @@ def _cross_talk(stage: XYStage, loops: tuple[Controller, Controller]) -> CrossTa
 def _names(table_2: bool) -> list[str]:
     """Files that the command writes."""
     from .._support.files.writing import picture_files
-    from ..xu_li_2010.table_2 import PUBLISHED
+    from ..xu_li_2010.experiments.table_2 import PUBLISHED
 
     if not table_2:
         return ["contour.csv", "contour.json", *picture_files("contour")]
@@ -289,7 +289,7 @@ def _circle(case: Published) -> str:
 
 def _table_document(table: Table2) -> dict[str, Any]:
     """Return published and obtained contour errors, for a program."""
-    from ..xu_li_2010.table_2 import PUBLISHED
+    from ..xu_li_2010.experiments.table_2 import PUBLISHED
 
     rows = [
         {
@@ -312,7 +312,7 @@ def _write_table(table: Table2, out: Path) -> list[Path]:
     import numpy as np
 
     from .._support.files.writing import make_folder, result_set, save_figures, write_columns
-    from ..xu_li_2010.table_2 import PUBLISHED
+    from ..xu_li_2010.experiments.table_2 import PUBLISHED
 
     columns = {
         "radius_um": [1e6 * case.radius for case in PUBLISHED],

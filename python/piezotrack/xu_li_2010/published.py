@@ -12,7 +12,7 @@ import numpy as np
 from .._support.files.json_text import parse_json
 from ..identification.experiments.step_readings import StepReadings
 from ..stages.feedback.dahl import DahlStage
-from .table_2 import PUBLISHED, Published
+from .experiments.table_2 import PUBLISHED, Published
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

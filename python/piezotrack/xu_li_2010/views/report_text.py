@@ -12,10 +12,10 @@ from ..published import SI
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from ..experiments.table_2 import Table2
     from ..published import Obtained
     from ..reproduction import Reproduction
     from ..section import Section
-    from ..table_2 import Table2
 
 __all__ = ["number", "place", "reading", "seen", "summary_text", "table_2_text", "tally"]
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
     from ...control.loop.contouring import Contour
-    from ..table_2 import Table2
+    from ..experiments.table_2 import Table2
 
 __all__ = ["plot_table_2"]
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..identification.experiments.step_response import StepResult, identify_step
+from ...identification.experiments.step_response import StepResult, identify_step
 
 if TYPE_CHECKING:
-    from .apparatus import Apparatus
+    from ..apparatus import Apparatus
 
 __all__ = ["observe", "step_test"]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..references.waveforms import sine
+from ...references.waveforms import sine
 
 if TYPE_CHECKING:
-    from ..references.reference import Reference
+    from ...references.reference import Reference
 
 __all__ = ["RULES", "SHRUNK", "fast", "shrunk", "slow"]
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from .._support.display.result import Result
-from ..control.loop.contouring import Contour, contour
-from ..references.paths import circle
+from ..._support.display.result import Result
+from ...control.loop.contouring import Contour, contour
+from ...references.paths import circle
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike
 
-    from ..control.controller.controller import Controller
-    from ..control.timing import Timing
-    from ..stages.xy import XYStage
+    from ...control.controller.controller import Controller
+    from ...control.timing import Timing
+    from ...stages.xy import XYStage
 
 __all__ = ["PUBLISHED", "Table2", "run_table_2"]
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..control.laws.pid import Pid
-from ..control.loop.tracking import Tracking
-from ..control.parts.repetitive import Repetitive
-from ..control.running.track import track
-from .apparatus import loop
+from ...control.laws.pid import Pid
+from ...control.loop.tracking import Tracking
+from ...control.parts.repetitive import Repetitive
+from ...control.running.track import track
+from ..apparatus import loop
 from .references import SHRUNK, fast, shrunk, slow
 
 if TYPE_CHECKING:
-    from ..stages.inverse import Inverse
-    from .apparatus import Apparatus
+    from ...stages.inverse import Inverse
+    from ..apparatus import Apparatus
 
 __all__ = ["antiwindup", "compensation", "observe", "observe_compensation", "repetitive"]
 

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .apparatus import loop
+from ..apparatus import loop
 from .fig_12_14_tracking import PID
 from .table_2 import Table2, run_table_2
 
 if TYPE_CHECKING:
-    from ..control.loop.tracking import Tracking
-    from ..stages.inverse import Inverse
-    from ..stages.xy import XYStage
-    from .apparatus import Apparatus
+    from ...control.loop.tracking import Tracking
+    from ...stages.inverse import Inverse
+    from ...stages.xy import XYStage
+    from ..apparatus import Apparatus
 
 __all__ = ["circles", "observe"]
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..identification.comparison.compare import Comparison, compare
-from ..identification.fit import identify
-from ..identification.methods.descents import Descents
-from ..stages.input.bouc_wen import BoucWenStage
+from ...identification.comparison.compare import Comparison, compare
+from ...identification.fit import identify
+from ...identification.methods.descents import Descents
+from ...stages.input.bouc_wen import BoucWenStage
 from .fig_06_identification import thinned
 from .procedure import FITTED_SECONDS
 
 if TYPE_CHECKING:
-    from ..data.dataset import Dataset
-    from ..identification.fitted.identification import Identification
+    from ...data.dataset import Dataset
+    from ...identification.fitted.identification import Identification
 
 __all__ = ["judge", "largest", "observe"]
 

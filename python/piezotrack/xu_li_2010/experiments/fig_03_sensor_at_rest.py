@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..identification.experiments.sensor_noise import Noise, identify_noise
+from ...identification.experiments.sensor_noise import Noise, identify_noise
 
 if TYPE_CHECKING:
-    from .apparatus import Apparatus
+    from ..apparatus import Apparatus
 
 __all__ = ["at_rest", "observe"]
 

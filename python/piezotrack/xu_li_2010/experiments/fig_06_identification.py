@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..data.dataset import Dataset
-from ..identification.fit import identify
-from ..identification.methods.particle_swarm import ParticleSwarm
-from ..stages.feedback.dahl import DahlStage
+from ...data.dataset import Dataset
+from ...identification.fit import identify
+from ...identification.methods.particle_swarm import ParticleSwarm
+from ...stages.feedback.dahl import DahlStage
 from .procedure import FITTED_SECONDS, SEARCH_BOX
 
 if TYPE_CHECKING:
-    from ..identification.fitted.identification import Identification
-    from .apparatus import Apparatus
+    from ...identification.fitted.identification import Identification
+    from ..apparatus import Apparatus
 
 __all__ = ["observe", "record", "search", "thinned"]
 
