@@ -8,9 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from ..errors import DeviceError, Interrupted, ParameterError
-from .devices import connected, with_what_is_kept
-from .error_messages import report_errors
+from ...errors import DeviceError, Interrupted, ParameterError
+from ..devices.connection import connected, with_what_is_kept
+from ..error_messages import report_errors
+from ..options import (
+    Duration,
+    Jitter,
+    Json,
+    ModelFile,
+    Out,
+    Overwrite,
+    Period,
+    Quiet,
+    refuse_without_effect,
+)
+from ..output import Output
 from .loop_options import (
     MODEL,
     NO_FEEDBACK,
@@ -36,22 +48,10 @@ from .loop_options import (
     small_margins,
     unit_of,
 )
-from .options import (
-    Duration,
-    Jitter,
-    Json,
-    ModelFile,
-    Out,
-    Overwrite,
-    Period,
-    Quiet,
-    refuse_without_effect,
-)
-from .output import Output
 
 if TYPE_CHECKING:
-    from ..control.loop.tracking import Tracking
-    from ..references.reference import Reference
+    from ...control.loop.tracking import Tracking
+    from ...references.reference import Reference
 
 __all__ = [
     "BeyondReach",
@@ -149,12 +149,12 @@ def track_command(
     quiet: Quiet = False,
 ) -> None:
     """Track a reference in closed loop."""
-    from .._support.files.writing import picture_files
-    from ..control.controller.controller import Controller
-    from ..control.loop.stability import check_loop
-    from ..control.running.track import track
-    from ..control.timing import Timing
-    from ..identification.fitted.model_file import load
+    from ..._support.files.writing import picture_files
+    from ...control.controller.controller import Controller
+    from ...control.loop.stability import check_loop
+    from ...control.running.track import track
+    from ...control.timing import Timing
+    from ...identification.fitted.model_file import load
 
     if device is not None:
         refuse_without_effect(context, SIMULATED, "with --device")
@@ -226,9 +226,9 @@ def _on_device(
     unstable: bool,
 ) -> None:
     """Close the loop of a controller file on a device; what was tracked before a fault is kept."""
-    from .._support.files.writing import picture_files
-    from ..control.controller.load import load_controller
-    from ..control.running.track import track
+    from ..._support.files.writing import picture_files
+    from ...control.controller.load import load_controller
+    from ...control.running.track import track
 
     loop = load_controller(file)
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
@@ -275,18 +275,18 @@ def feedforward_command(
     quiet: Quiet = False,
 ) -> None:
     """Compute the feedforward voltage for a reference."""
-    from .._support.files.writing import (
+    from ..._support.files.writing import (
         make_folder,
         picture_files,
         result_set,
         save_figures,
         write_columns,
     )
-    from .._support.units import drive_word, shown_unit
-    from ..control.loop.preconditions import check_within_reach
-    from ..control.plant import plant_of
-    from ..control.views.tracking_plot import plot_feedforward
-    from ..identification.fitted.model_file import load
+    from ..._support.units import drive_word, shown_unit
+    from ...control.loop.preconditions import check_within_reach
+    from ...control.plant import plant_of
+    from ...control.views.tracking_plot import plot_feedforward
+    from ...identification.fitted.model_file import load
 
     known = load(model)
     desired = parsed_reference(reference, duration, period)
@@ -337,8 +337,8 @@ def feedforward_command(
 
 def parsed_reference(text: str, duration: float | None, period: float | None) -> Reference:
     """Read the reference from a file if the text names one, else parse the text."""
-    from ..references.parse import parse_reference
-    from ..references.reference import read_reference
+    from ...references.parse import parse_reference
+    from ...references.reference import read_reference
 
     if Path(text).is_file():
         return read_reference(text, duration=duration, period=period)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .error_messages import report_errors
-from .options import Json, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
-from .output import Output
+from ..error_messages import report_errors
+from ..options import Json, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
+from ..output import Output
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ..control.loop.tracking import Tracking
+    from ...control.loop.tracking import Tracking
 
 __all__ = ["demo_command"]
 
@@ -44,12 +44,12 @@ def demo_command(
 
 def _measured(result: Output, seed: int) -> None:
     """Run the demonstration on the two measured logs of the package."""
-    from .._support.files.writing import make_folder, picture_files, result_set, save_figures
-    from ..data.log_file import write_log
-    from ..identification.views.plot import plot_loop, plot_time, what_was_shown
-    from ..identification.views.report import identification_files, save_identification
+    from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
+    from ...data.log_file import write_log
+    from ...identification.views.plot import plot_loop, plot_time, what_was_shown
+    from ...identification.views.report import identification_files, save_identification
     from .demonstration import run_demo
-    from .demonstration_plot import plot_before_and_after
+    from .loop_plot import plot_before_and_after
 
     # The logs are known, and so is the kind of model that suits them.
     model = identification_files("prandtl-ishlinskii", searched=False)
@@ -112,10 +112,10 @@ def _commands(out: Path) -> list[str]:
 
 def _paper(result: Output, seed: int) -> None:
     """Run the demonstration of the paper: its stage, simulated, and its model."""
-    from .._support.files.writing import make_folder, picture_files, result_set, save_figures
-    from ..data.log_file import write_log
-    from ..identification.views.report import identification_files, save_identification
-    from ..xu_li_2010.demo import demo_log, identify_demo, track_demo
+    from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
+    from ...data.log_file import write_log
+    from ...identification.views.report import identification_files, save_identification
+    from ...xu_li_2010.demo import demo_log, identify_demo, track_demo
 
     tracked = picture_files(*(f"track_{name}" for name in RUNS))
     result.will_write(["log.csv", *identification_files("dahl", searched=True), *tracked])

@@ -9,9 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from ..errors import DataError, DeviceError, Interrupted, ParameterError
-from .devices import Rest, connected, with_what_is_kept
-from .error_messages import report_errors
+from ...errors import DataError, DeviceError, Interrupted, ParameterError
+from ..devices.connection import Rest, connected, with_what_is_kept
+from ..error_messages import report_errors
+from ..options import (
+    Duration,
+    Json,
+    ModelFile,
+    Overwrite,
+    Period,
+    Quiet,
+    number,
+    refuse_without_effect,
+)
+from ..output import Output
 from .loop_options import (
     PAPER,
     AmplifierBandwidth,
@@ -32,27 +43,16 @@ from .loop_options import (
     simulated,
     unit_of,
 )
-from .options import (
-    Duration,
-    Json,
-    ModelFile,
-    Overwrite,
-    Period,
-    Quiet,
-    number,
-    refuse_without_effect,
-)
-from .output import Output
 from .track import BeyondReach, parsed_reference
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
 
-    from ..control.learning.iterative_learning import IterativeLearning
-    from ..control.learning.learn import Learning
-    from ..hardware.device import Device
-    from ..identification.fitted.identified_model import IdentifiedModel
-    from ..stages.virtual import VirtualStage
+    from ...control.learning.iterative_learning import IterativeLearning
+    from ...control.learning.learn import Learning
+    from ...hardware.device import Device
+    from ...identification.fitted.identified_model import IdentifiedModel
+    from ...stages.virtual import VirtualStage
 
 __all__ = ["learn_command"]
 
@@ -127,11 +127,11 @@ def learn_command(
     quiet: Quiet = False,
 ) -> None:
     """Learn the voltage of a repeated motion."""
-    from .._support.files.writing import picture_files
-    from ..control.controller.controller import Controller
-    from ..control.learning.learn import learn
-    from ..control.timing import Timing
-    from ..identification.fitted.model_file import load
+    from ..._support.files.writing import picture_files
+    from ...control.controller.controller import Controller
+    from ...control.learning.learn import learn
+    from ...control.timing import Timing
+    from ...identification.fitted.model_file import load
 
     own = stage != PAPER
     settings = Loop(own, dt, limits, feedback, kp, ti, td)
@@ -203,7 +203,7 @@ def _within(
     plant: VirtualStage | Device, settings: Loop, known: IdentifiedModel
 ) -> tuple[float, float]:
     """Return the limits of the table [V]; by default no more than those of a device."""
-    from ..hardware.device import Device
+    from ...hardware.device import Device
 
     low, high = settings.volts(known)
     if settings.limits is None and isinstance(plant, Device):
@@ -216,7 +216,7 @@ def _within(
 
 def _write(found: Learning, out: Path, picture: bool) -> list[Path]:
     """Write the table and, where it is asked for, the picture."""
-    from .._support.files.writing import make_folder, result_set, save_figures
+    from ..._support.files.writing import make_folder, result_set, save_figures
 
     with result_set(make_folder(out.parent)) as folder:
         written = [found.save(folder / out.name)]
@@ -233,7 +233,7 @@ def _kept(learnt: Learning, out: Path, picture: bool) -> str:
 
 def _show(learner: IterativeLearning) -> None:
     """Print the convergence before the first trial, and the errors of each."""
-    from ..control.views.learning_text import heading, trial_line
+    from ...control.views.learning_text import heading, trial_line
 
     made = len(learner.trials)
     line = trial_line(made - 1, learner.trials[-1]) if made else heading(learner)
@@ -241,7 +241,7 @@ def _show(learner: IterativeLearning) -> None:
 
 
 def _outcome(found: Learning) -> str:
-    from ..control.views.learning_text import outcome
+    from ...control.views.learning_text import outcome
 
     before, after = found.errors[0], found.errors[found.best]
     best = f"best: trial {found.best}, {1e9 * after:.4g} nm rms after {1e9 * before:.4g} nm"

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ..stages.model_info import LISTED
-from .error_messages import report_errors
-from .options import (
+from ...stages.model_info import LISTED
+from ..error_messages import report_errors
+from ..options import (
     Columns,
     DisplacementColumn,
     DriveColumn,
@@ -28,7 +28,7 @@ from .options import (
     seconds,
     windowed,
 )
-from .output import Output
+from ..output import Output
 
 __all__ = ["compare_command"]
 
@@ -75,8 +75,8 @@ def compare_command(
     quiet: Quiet = False,
 ) -> None:
     """Fit several models to a log and validate them."""
-    from ..identification.comparison.compare import compare, comparison_files
-    from ..stages.registry import MODELS
+    from ...identification.comparison.compare import compare, comparison_files
+    from ...stages.registry import MODELS
 
     searched = {one.name for one in MODELS if one.searched}
     if model and searched.isdisjoint(model):

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import ParameterError
-from .error_messages import report_errors
+from ...errors import ParameterError
+from ..error_messages import report_errors
+from ..options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  # noqa: TC001 - read by typer
+from ..output import Output
 from .loop_options import AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise, noise_metres
-from .options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  # noqa: TC001 - read by typer
-from .output import Output
 from .track import parsed_reference
 
 if TYPE_CHECKING:
-    from ..control.tuning.tuned import Tuned
+    from ...control.tuning.tuned import Tuned
 
 __all__ = ["tune_command"]
 
@@ -86,13 +86,13 @@ def tune_command(
     quiet: Quiet = False,
 ) -> None:
     """Find the gains of a controller under margins."""
-    from .._support.files.writing import picture_files
-    from ..control.timing import Timing
-    from ..control.tuning.goal import Goal, TuningSearch
-    from ..control.tuning.margins import Margins, Spread
-    from ..control.tuning.tune import tune
-    from ..identification.fitted.model_file import load
-    from ..stages.virtual import VirtualStage
+    from ..._support.files.writing import picture_files
+    from ...control.timing import Timing
+    from ...control.tuning.goal import Goal, TuningSearch
+    from ...control.tuning.margins import Margins, Spread
+    from ...control.tuning.tune import tune
+    from ...identification.fitted.model_file import load
+    from ...stages.virtual import VirtualStage
 
     _within("--gain-margin", gain_margin, 1.0, math.inf, "a factor above 1")
     _within("--phase-margin", phase_margin, 0.0, 180.0, "degrees, 0 to below 180")
@@ -155,7 +155,7 @@ def _name(i: int) -> str:
 
 def _document(tuned: Tuned) -> dict[str, Any]:
     """Content of the JSON file: the controller and what it keeps."""
-    from .. import __version__
+    from ... import __version__
 
     controller, report = tuned
     return {
@@ -182,7 +182,7 @@ def _document(tuned: Tuned) -> dict[str, Any]:
 
 def _write(tuned: Tuned, document: dict[str, Any], out: Path) -> list[Path]:
     """Write report and controller as JSON, and a picture of the loop along each reference."""
-    from .._support.files.writing import make_folder, result_set, save_figures, write_document
+    from ..._support.files.writing import make_folder, result_set, save_figures, write_document
 
     with result_set(make_folder(out)) as folder:
         pictures = {_name(i): run.plot() for i, run in enumerate(tuned.report.runs)}

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .error_messages import report_errors
-from .options import (
+from ..error_messages import report_errors
+from ..options import (
     Columns,
     DisplacementColumn,
     Interval,
@@ -21,7 +21,7 @@ from .options import (
     of_file,
     windowed,
 )
-from .output import Output
+from ..output import Output
 
 __all__ = ["noise_command"]
 
@@ -48,9 +48,9 @@ def noise_command(
 
     Its rms, resolution and spectrum, and a model of it.
     """
-    from .._support.files.writing import picture_files
-    from ..data.reader import read_displacement
-    from ..identification.experiments.sensor_noise import identify_noise
+    from ..._support.files.writing import picture_files
+    from ...data.reader import read_displacement
+    from ...identification.experiments.sensor_noise import identify_noise
 
     columns = Columns(time, None, displacement, unit, dt)
     log = read_displacement(

@@ -8,8 +8,10 @@ from typing import Annotated
 
 import typer
 
-from ..errors import ParameterError
-from .error_messages import report_errors
+from ...errors import ParameterError
+from ..error_messages import report_errors
+from ..options import Json, ModelFile, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
+from ..output import Output
 from .loop_options import (
     PAPER,
     AmplifierBandwidth,
@@ -24,8 +26,6 @@ from .loop_options import (
     refuse_of_other_stage,
     simulated,
 )
-from .options import Json, ModelFile, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
-from .output import Output
 
 __all__ = ["compare_controllers_command"]
 
@@ -72,12 +72,12 @@ def compare_controllers_command(
     quiet: Quiet = False,
 ) -> None:
     """Compare controllers on one stage."""
-    from .._support.files.writing import picture_files
-    from ..control.comparing.compare import compare_controllers
-    from ..control.timing import Timing
-    from ..control.tuning.goal import TuningSearch
-    from ..control.tuning.margins import Margins
-    from ..identification.fitted.model_file import load
+    from ..._support.files.writing import picture_files
+    from ...control.comparing.compare import compare_controllers
+    from ...control.timing import Timing
+    from ...control.tuning.goal import TuningSearch
+    from ...control.tuning.margins import Margins
+    from ...identification.fitted.model_file import load
 
     own = stage != PAPER
     refuse_of_other_stage(context, own)

@@ -9,8 +9,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import DataError, ParameterError
-from .error_messages import report_errors
+from ...errors import DataError, ParameterError
+from ..error_messages import report_errors
+from ..options import (
+    Duration,
+    Jitter,
+    Json,
+    Out,
+    Overwrite,
+    Period,
+    Quiet,
+    number,
+    number_range,
+    refuse_without_effect,
+)
+from ..output import Output
 from .loop_options import (
     MODEL,
     NO_FEEDBACK,
@@ -30,27 +43,14 @@ from .loop_options import (
     noise_metres,
     refuse_of_other_stage,
 )
-from .options import (
-    Duration,
-    Jitter,
-    Json,
-    Out,
-    Overwrite,
-    Period,
-    Quiet,
-    number,
-    number_range,
-    refuse_without_effect,
-)
-from .output import Output
 from .xy_stages import OwnStage, PaperStage
 
 if TYPE_CHECKING:
-    from ..control.controller.controller import Controller
-    from ..identification.experiments.cross_talk import CrossTalk
-    from ..references.xy_reference import XYReference
-    from ..stages.xy import XYStage
-    from ..xu_li_2010.experiments.table_2 import Published, Table2
+    from ...control.controller.controller import Controller
+    from ...identification.experiments.cross_talk import CrossTalk
+    from ...references.xy_reference import XYReference
+    from ...stages.xy import XYStage
+    from ...xu_li_2010.experiments.table_2 import Published, Table2
 
 __all__ = ["contour_command"]
 
@@ -134,9 +134,9 @@ def contour_command(
     quiet: Quiet = False,
 ) -> None:
     """Simulate contouring of a path with an XY stage."""
-    from ..control.loop.contouring import contour
-    from ..control.timing import Timing
-    from ..xu_li_2010.experiments.table_2 import run_table_2
+    from ...control.loop.contouring import contour
+    from ...control.timing import Timing
+    from ...xu_li_2010.experiments.table_2 import run_table_2
 
     own = _is_own(stage, models, table_2)
     gains = _gains(kp)
@@ -229,8 +229,8 @@ def _path(
     place: dict[str, Any],
 ) -> XYReference:
     """Read the path from a file if the text names one, else parse the text."""
-    from ..references.parse import parse_path
-    from ..references.xy_reference import read_path
+    from ...references.parse import parse_path
+    from ...references.xy_reference import read_path
 
     if Path(text).is_file():
         try:
@@ -259,7 +259,7 @@ def _cross_talk(stage: XYStage, loops: tuple[Controller, Controller]) -> CrossTa
     """Identify the cross-talk from records with one axis driven at a time between its limits."""
     import numpy as np
 
-    from ..identification.experiments.cross_talk import identify_cross_talk
+    from ...identification.experiments.cross_talk import identify_cross_talk
 
     t = np.arange(8000) / 1000.0
     lows, highs = zip(*(loop.limits for loop in loops), strict=True)
@@ -275,8 +275,8 @@ def _cross_talk(stage: XYStage, loops: tuple[Controller, Controller]) -> CrossTa
 
 def _names(table_2: bool) -> list[str]:
     """Files that the command writes."""
-    from .._support.files.writing import picture_files
-    from ..xu_li_2010.experiments.table_2 import PUBLISHED
+    from ..._support.files.writing import picture_files
+    from ...xu_li_2010.experiments.table_2 import PUBLISHED
 
     if not table_2:
         return ["contour.csv", "contour.json", *picture_files("contour")]
@@ -289,7 +289,7 @@ def _circle(case: Published) -> str:
 
 def _table_document(table: Table2) -> dict[str, Any]:
     """Return published and obtained contour errors, for a program."""
-    from ..xu_li_2010.experiments.table_2 import PUBLISHED
+    from ...xu_li_2010.experiments.table_2 import PUBLISHED
 
     rows = [
         {
@@ -311,8 +311,8 @@ def _write_table(table: Table2, out: Path) -> list[Path]:
     """Write the table with published and obtained values, and the pictures."""
     import numpy as np
 
-    from .._support.files.writing import make_folder, result_set, save_figures, write_columns
-    from ..xu_li_2010.experiments.table_2 import PUBLISHED
+    from ..._support.files.writing import make_folder, result_set, save_figures, write_columns
+    from ...xu_li_2010.experiments.table_2 import PUBLISHED
 
     columns = {
         "radius_um": [1e6 * case.radius for case in PUBLISHED],

@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from ..errors import ParameterError
-from .devices import connected
-from .error_messages import report_errors
-from .options import number_range, refuse_without_effect
+from ...errors import ParameterError
+from ..error_messages import report_errors
+from ..options import number_range, refuse_without_effect
+from .connection import connected
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import TypeAlias
 
-    from ..hardware.device import Device
-    from ..hardware.virtual import VirtualDevice
-    from ..stages.virtual import VirtualStage
+    from ...hardware.device import Device
+    from ...hardware.virtual import VirtualDevice
+    from ...stages.virtual import VirtualStage
 
     Limits: TypeAlias = tuple[float, float]
     # The address, and the limits [V].
@@ -112,7 +112,7 @@ def serve_command(
 
 def _stage(model: Path | None, limits: str | None) -> tuple[VirtualStage, Limits | None]:
     """Return the virtual stage of the options, with its limits [V]; None for the amplifier's."""
-    from ..hardware.virtual import virtual_stage
+    from ...hardware.virtual import virtual_stage
 
     stage, known = virtual_stage(model)
     within = known if limits is None else number_range("--limits", limits)
@@ -126,8 +126,8 @@ def _stage(model: Path | None, limits: str | None) -> tuple[VirtualStage, Limits
 
 def _timed(stage: VirtualStage, limits: Limits | None, speed: float) -> VirtualDevice:
     """Return a stage as a device whose time goes faster."""
-    from .._support.arguments import positive
-    from ..hardware.virtual import VirtualDevice
+    from ..._support.arguments import positive
+    from ...hardware.virtual import VirtualDevice
 
     speed = positive("speed", speed, "times real time")
     return VirtualDevice(stage, limits=limits, clock=lambda: speed * time.monotonic())
@@ -135,7 +135,7 @@ def _timed(stage: VirtualStage, limits: Limits | None, speed: float) -> VirtualD
 
 @contextmanager
 def _gcs(stage: VirtualStage, limits: Limits | None, host: str, port: int, speed: float) -> Served:
-    from ..adapters.simulators.gcs.server import GcsServer
+    from ...adapters.simulators.gcs.server import GcsServer
 
     with GcsServer(stage, limits=limits, host=host, port=port, speed=speed) as server:
         yield server.address, server.limits
@@ -143,7 +143,7 @@ def _gcs(stage: VirtualStage, limits: Limits | None, host: str, port: int, speed
 
 @contextmanager
 def _scpi(stage: VirtualStage, limits: Limits | None, host: str, port: int, speed: float) -> Served:
-    from ..adapters.simulators.virtual_scpi import VirtualScpi
+    from ...adapters.simulators.virtual_scpi import VirtualScpi
 
     device = _timed(stage, limits, speed)
     with VirtualScpi(device, host=host, port=port) as server:
@@ -165,7 +165,7 @@ def _published(
 
 
 def _epics(device: Device, prefix: str) -> None:
-    from ..adapters.epics import RECORDS, serve_epics
+    from ...adapters.epics import RECORDS, serve_epics
 
     low, high = device.limits
     records = ", ".join(f"{prefix}:{name}" for name in RECORDS)

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ..errors import ParameterError
-from .error_messages import report_errors
-from .options import (
+from ...errors import ParameterError
+from ..error_messages import report_errors
+from ..options import (
     Columns,
     DisplacementColumn,
     DriveColumn,
@@ -26,7 +26,7 @@ from .options import (
     of_file,
     windowed,
 )
-from .output import Output
+from ..output import Output
 
 __all__ = ["step_command"]
 
@@ -65,8 +65,8 @@ def step_command(
 
     And the hysteresis parameters of the Dahl model, as in section 3.3 of Xu and Li 2010.
     """
-    from .._support.files.writing import picture_files
-    from ..identification.experiments.step_response import identify_step
+    from ..._support.files.writing import picture_files
+    from ...identification.experiments.step_response import identify_step
 
     log = Columns(time, drive, displacement, unit, dt).read(file, hold, resample)
     log = windowed(log, file, "--window", window)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.display.plot_style import (
+from ..._support.display.plot_style import (
     ACTUAL,
     DESIRED,
     ERROR,
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
-    from ..control.loop.tracking import Tracking
+    from ...control.loop.tracking import Tracking
 
 __all__ = ["plot_before_and_after"]
 

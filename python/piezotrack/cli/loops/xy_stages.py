@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..errors import ParameterError
+from ...errors import ParameterError
 from .loop_options import PAPER, drive_notes, driven_by_voltage
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ..control.controller.controller import Controller
-    from ..control.loop.contouring import Contour
-    from ..identification.fitted.identified_model import IdentifiedModel
-    from ..references.xy_reference import XYReference
-    from ..stages.inverse import Inverse
-    from ..stages.xy import XYStage
+    from ...control.controller.controller import Controller
+    from ...control.loop.contouring import Contour
+    from ...identification.fitted.identified_model import IdentifiedModel
+    from ...references.xy_reference import XYReference
+    from ...stages.inverse import Inverse
+    from ...stages.xy import XYStage
     from .loop_options import Loop
 
 __all__ = ["OwnStage", "PaperStage"]
@@ -25,7 +25,7 @@ class OwnStage:
     """The stage of one's own models: of x and y, or one for both."""
 
     def __init__(self, models: list[Path] | None, loops: tuple[Loop, Loop]) -> None:
-        from ..identification.fitted.model_file import load
+        from ...identification.fitted.model_file import load
 
         files = models or []
         self._files = [files[0], files[-1]]
@@ -37,8 +37,8 @@ class OwnStage:
 
     def stage(self, noise: float, bandwidth: float, seed: int) -> XYStage:
         """Make the stage, with noise of its sensors [m] and bandwidth of its amplifiers [Hz]."""
-        from ..stages.virtual import VirtualStage
-        from ..stages.xy import XYStage
+        from ...stages.virtual import VirtualStage
+        from ...stages.xy import XYStage
 
         # With one seed both would have the same noise.
         x, y = (
@@ -52,7 +52,7 @@ class OwnStage:
 
     def place(self, stage: XYStage) -> dict[str, Any]:
         """Find centre and origin of a path: the middle of the workspace, where a run begins."""
-        from ..control.loop.contouring import workspace
+        from ...control.loop.contouring import workspace
 
         found = workspace(stage, self._limits())
         return {"centre": found.centre, "origin": found.rest}
@@ -61,7 +61,7 @@ class OwnStage:
         self, path: XYReference | None, feedforward: bool
     ) -> tuple[Controller, Controller]:
         """Make the controllers of x and y."""
-        from ..control.controller.controller import Controller
+        from ...control.controller.controller import Controller
 
         assert path is not None
         x, y = (
@@ -99,7 +99,7 @@ class PaperStage:
 
     def stage(self, noise: float, bandwidth: float, seed: int) -> XYStage:
         """Make the stage, with noise of its sensors [m] and bandwidth of its amplifiers [Hz]."""
-        from ..stages.xy import XYStage
+        from ...stages.xy import XYStage
 
         # Its sensors and amplifiers are its own.
         del noise, bandwidth
@@ -119,7 +119,7 @@ class PaperStage:
         self, path: XYReference | None, feedforward: bool
     ) -> tuple[Controller, Controller]:
         """Make the controllers of x and y."""
-        from ..control.controller.controller import Controller
+        from ...control.controller.controller import Controller
 
         inverse = self._inverse() if feedforward else None
         interval = path.x if path is not None else None
@@ -133,8 +133,8 @@ class PaperStage:
 
     def _inverse(self) -> Inverse:
         """Invert the model, or one identified as in the paper."""
-        from ..identification.fitted.model_file import load
-        from ..xu_li_2010.demo import demo_log, identify_demo
+        from ...identification.fitted.model_file import load
+        from ...xu_li_2010.demo import demo_log, identify_demo
 
         if self._file is not None:
             self.words = f"feedforward by {self._file.name} on both axes"

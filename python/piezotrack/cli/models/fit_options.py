@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 
-from ..errors import ParameterError
-from ..stages.model_info import LISTED
-from .options import number, number_range, pairs, refuse_without_effect
+from ...errors import ParameterError
+from ...stages.model_info import LISTED
+from ..options import number, number_range, pairs, refuse_without_effect
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from ..data.dataset import Dataset
-    from ..identification.methods.choice import Method as OneMethod
-    from ..identification.methods.choice import Search
-    from ..identification.methods.least_squares import LeastSquares
-    from ..identification.methods.particle_swarm import ParticleSwarm
-    from ..identification.problem.parameter import Parameter
-    from ..identification.problem.records import Record
+    from ...data.dataset import Dataset
+    from ...identification.methods.choice import Method as OneMethod
+    from ...identification.methods.choice import Search
+    from ...identification.methods.least_squares import LeastSquares
+    from ...identification.methods.particle_swarm import ParticleSwarm
+    from ...identification.problem.parameter import Parameter
+    from ...identification.problem.records import Record
 
 __all__ = [
     "AUTO",
@@ -257,7 +257,7 @@ class Kinds:
     @classmethod
     def checked(cls, given: list[str] | None) -> Kinds:
         """Check the names before the first model is identified."""
-        from ..stages.registry import model_named
+        from ...stages.registry import model_named
 
         names = tuple(given or [AUTO])
         for i, name in enumerate(names):
@@ -350,7 +350,7 @@ class FitOptions:
 
     def parameters(self) -> dict[str, Parameter]:
         """Return what is said of each parameter."""
-        from ..identification.problem.parameter import Parameter
+        from ...identification.problem.parameter import Parameter
 
         given: dict[str, dict[str, Any]] = {}
         for option, texts, what in (
@@ -409,9 +409,9 @@ class FitOptions:
         return [one for one in (search, weights) if one is not None] or None
 
     def _search(self, kind: str) -> Search | None:
-        from ..identification.methods.choice import ITERATIONS
-        from ..identification.methods.descents import Descents
-        from ..identification.methods.particle_swarm import ParticleSwarm
+        from ...identification.methods.choice import ITERATIONS
+        from ...identification.methods.descents import Descents
+        from ...identification.methods.particle_swarm import ParticleSwarm
 
         swarm = self._swarm
         if self.method == "descents" and swarm is not None:
@@ -430,7 +430,7 @@ class FitOptions:
 
     @property
     def _least_squares(self) -> LeastSquares | None:
-        from ..identification.methods.least_squares import LeastSquares
+        from ...identification.methods.least_squares import LeastSquares
 
         settings: dict[str, Any] = {}
         if self.plays is not None:
@@ -449,7 +449,7 @@ class FitOptions:
 
 
 def _swarm_named(name: str) -> ParticleSwarm:
-    from ..identification.methods.particle_swarm import ParticleSwarm
+    from ...identification.methods.particle_swarm import ParticleSwarm
 
     known = {
         "default": ParticleSwarm(),
@@ -491,7 +491,7 @@ def of_each_log(
     weight: list[float] | None,
 ) -> list[Record]:
     """Put with each of several logs what is said of it; one value stands for all of them."""
-    from ..identification.problem.records import Record, label_of, of_record
+    from ...identification.problem.records import Record, label_of, of_record
 
     count = len(logs)
     given = zip(

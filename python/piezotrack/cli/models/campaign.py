@@ -9,8 +9,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import DataError, Interrupted, ParameterError
-from .error_messages import report_errors
+from ...errors import DataError, Interrupted, ParameterError
+from ..error_messages import report_errors
+from ..interruption import acknowledge_interrupt
+from ..options import (
+    Columns,
+    DisplacementColumn,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Json,
+    Quiet,
+    Resample,
+    Seconds,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    refuse_without_effect,
+    windowed,
+)
+from ..output import Output
 from .fit_options import (
     Asymmetry,
     Bound,
@@ -35,24 +53,6 @@ from .fit_options import (
     drift_asked,
     searched,
 )
-from .interruption import acknowledge_interrupt
-from .options import (
-    Columns,
-    DisplacementColumn,
-    DriveColumn,
-    HoldOption,
-    Interval,
-    Json,
-    Quiet,
-    Resample,
-    Seconds,
-    TimeColumn,
-    Units,
-    can_be_folder,
-    refuse_without_effect,
-    windowed,
-)
-from .output import Output
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -128,9 +128,9 @@ def campaign_command(
     quiet: Quiet = False,
 ) -> None:
     """Identify models of many logs; run again for the rest."""
-    from .._support.files.writing import save_figures
-    from ..identification.campaigns.campaign import campaign
-    from ..identification.campaigns.result import check_parquet
+    from ..._support.files.writing import save_figures
+    from ...identification.campaigns.campaign import campaign
+    from ...identification.campaigns.result import check_parquet
 
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from ..errors import ParameterError
-from .error_messages import report_errors
-from .options import (
+from ...errors import ParameterError
+from ..error_messages import report_errors
+from ..options import (
     Columns,
     DriveColumn,
     HoldOption,
@@ -23,7 +23,7 @@ from .options import (
     Units,
     of_file,
 )
-from .output import Output
+from ..output import Output
 
 __all__ = ["simulate_command"]
 
@@ -43,16 +43,16 @@ def simulate_command(
     quiet: Quiet = False,
 ) -> None:
     """Simulate the response of a model to a drive."""
-    from .._support.files.writing import (
+    from ..._support.files.writing import (
         make_folder,
         picture_files,
         result_set,
         save_figures,
         write_columns,
     )
-    from .._support.units import drive_word, shown_unit
-    from ..identification.fitted.model_file import load
-    from ..identification.views.plot import plot_response
+    from ..._support.units import drive_word, shown_unit
+    from ...identification.fitted.model_file import load
+    from ...identification.views.plot import plot_response
 
     known = load(model)
     columns = Columns(time, drive, None, unit, dt)

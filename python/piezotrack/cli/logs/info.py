@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json as json_text
 
-from .error_messages import report_errors
-from .options import (
+from ..error_messages import report_errors
+from ..options import (
     Columns,
     DisplacementColumn,
     DriveColumn,
@@ -34,9 +34,9 @@ def info_command(
     Columns, units, ranges, rate, gaps, where the drive rests and reverses, and which models such a
     record can determine.
     """
-    from .._support.files.writing import json_ready
-    from ..data.log_info import info
-    from .advice import as_options
+    from ..._support.files.writing import json_ready
+    from ...data.log_info import info
+    from ..advice import as_options
 
     columns = Columns(time, drive, displacement, unit, dt)
     found = info(

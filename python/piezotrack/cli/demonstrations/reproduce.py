@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from .error_messages import report_errors
-from .options import Json, Out, Overwrite, Quiet, refuse_without_effect
-from .output import Output
+from ..error_messages import report_errors
+from ..options import Json, Out, Overwrite, Quiet, refuse_without_effect
+from ..output import Output
 
 __all__ = ["reproduce_command"]
 
@@ -41,7 +41,7 @@ def reproduce_command(
 
     On a simulated stage, with a report as HTML, PDF and JSON.
     """
-    from ..xu_li_2010.reproduction import REPORT, reproduce
+    from ...xu_li_2010.reproduction import REPORT, reproduce
 
     if quick:
         refuse_without_effect(context, ("seeds",), "with --quick")

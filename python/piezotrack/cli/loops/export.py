@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from ..errors import ParameterError
-from .error_messages import report_errors
-from .options import (
+from ...errors import ParameterError
+from ..error_messages import report_errors
+from ..options import (
     Duration,
     Json,
     Out,
@@ -19,14 +19,14 @@ from .options import (
     of_file,
     refuse_without_effect,
 )
-from .output import Output
+from ..output import Output
 from .track import parsed_reference
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ..export.write import Exported
+    from ...export.write import Exported
 
 __all__ = ["export_command"]
 
@@ -80,8 +80,8 @@ def export_command(
     quiet: Quiet = False,
 ) -> None:
     """Write a controller as C, coefficients or FMU."""
-    from ..control.controller.load import load_controller
-    from ..export.write import export_controller, export_files
+    from ...control.controller.load import load_controller
+    from ...export.write import export_controller, export_files
 
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     chosen = controller.stem.replace("-", "_") if name is None else name
@@ -108,7 +108,7 @@ def export_command(
 
 def _table(file: Path, dt: float, unit: str) -> NDArray[np.float64]:
     """Read one period of a feedforward, with a sample for each interval."""
-    from ..data.reader import drive_dataset
+    from ...data.reader import drive_dataset
 
     record = drive_dataset(file)
     if abs(record.dt - dt) > 1e-6 * dt:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..errors import ParameterError
-from .error_messages import report_errors
-from .options import (
+from ...errors import ParameterError
+from ..error_messages import report_errors
+from ..options import (
     Columns,
     DisplacementColumn,
     DriveColumn,
@@ -40,8 +40,8 @@ def convert_command(
     In s, V and m, with the units in the titles: what is read from OUT is what is read from FILE,
     to the last bit.
     """
-    from ..data.log_file import format_to_write
-    from .advice import as_options
+    from ...data.log_file import format_to_write
+    from ..advice import as_options
 
     format_to_write(out)
     if out.exists() and not overwrite:

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from .devices import DeviceAddress, Rest, connected
-from .error_messages import report_errors
-from .options import Duration, Json, Out, Overwrite, Period, Quiet  # noqa: TC001, typer reads it
-from .output import Output
+from ..devices.connection import DeviceAddress, Rest, connected
+from ..error_messages import report_errors
+from ..options import Duration, Json, Out, Overwrite, Period, Quiet  # noqa: TC001, typer reads it
+from ..output import Output
 from .track import parsed_reference
 
 __all__ = ["play_command"]
@@ -41,10 +41,10 @@ def play_command(
     quiet: Quiet = False,
 ) -> None:
     """Play a feedforward as a table on a device."""
-    from .._support.files.writing import picture_files
-    from ..control.controller.load import load_controller
-    from ..control.on_device.playing import play
-    from ..identification.fitted.model_file import load
+    from ..._support.files.writing import picture_files
+    from ...control.controller.load import load_controller
+    from ...control.on_device.playing import play
+    from ...identification.fitted.model_file import load
 
     forward = load_controller(file) if rate is None else load(file).inverse()
     desired = parsed_reference(reference, duration, period)

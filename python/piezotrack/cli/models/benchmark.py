@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import DataError, ParameterError
-from .error_messages import report_errors
-from .options import (
+from ...errors import DataError, ParameterError
+from ..error_messages import report_errors
+from ..options import (
     Columns,
     DisplacementColumn,
     DriveColumn,
@@ -27,11 +27,11 @@ from .options import (
     seconds,
     windowed,
 )
-from .output import Output
+from ..output import Output
 
 if TYPE_CHECKING:
-    from ..benchmarking.record import BenchmarkRecord
-    from ..data.dataset import Dataset
+    from ...benchmarking.record import BenchmarkRecord
+    from ...data.dataset import Dataset
 
 __all__ = ["benchmark_command"]
 
@@ -92,7 +92,7 @@ def benchmark_command(
     quiet: Quiet = False,
 ) -> None:
     """Compare all models on many records."""
-    from ..benchmarking.board import benchmark
+    from ...benchmarking.board import benchmark
 
     if not files:
         refuse_without_effect(context, ("train", "test"), "without a FILE")
@@ -129,7 +129,7 @@ def _record(
     file: Path, log: Dataset, train: str | None, test: str | None, other: Dataset | None
 ) -> BenchmarkRecord:
     """Make the record of a log."""
-    from ..benchmarking.record import BenchmarkRecord
+    from ...benchmarking.record import BenchmarkRecord
 
     with of_file(file):
         return BenchmarkRecord.of_log(

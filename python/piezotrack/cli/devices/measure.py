@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from ..errors import ParameterError
-from .devices import DeviceAddress, Rest, connected
-from .error_messages import report_errors
-from .options import Duration, Overwrite, Quiet, list_files
+from ...errors import ParameterError
+from ..error_messages import report_errors
+from ..options import Duration, Overwrite, Quiet, list_files
+from .connection import DeviceAddress, Rest, connected
 
 __all__ = ["measure_command"]
 
@@ -47,9 +47,9 @@ def measure_command(
     A drive goes out, the displacement comes back. The log has the way from rest and back too, so
     that its hysteresis is known from the start.
     """
-    from ..data.log_file import format_to_write
-    from ..hardware.excitations import parse_drive
-    from ..hardware.measuring import measure
+    from ...data.log_file import format_to_write
+    from ...hardware.excitations import parse_drive
+    from ...hardware.measuring import measure
 
     format_to_write(out)
     if out.exists() and not overwrite:

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .._support.units import shown_unit
-from ..errors import ParameterError
-from .options import number_range, refuse_without_effect
+from ..._support.units import shown_unit
+from ...errors import ParameterError
+from ..options import number_range, refuse_without_effect
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from ..control.laws.pid import Pid
-    from ..control.loop.stability import LoopCheck
-    from ..control.loop.tracking import Tracking
-    from ..control.parts.repetitive import Repetitive
-    from ..identification.fitted.identified_model import IdentifiedModel
-    from ..references.reference import Reference
-    from ..stages.virtual import VirtualStage
+    from ...control.laws.pid import Pid
+    from ...control.loop.stability import LoopCheck
+    from ...control.loop.tracking import Tracking
+    from ...control.parts.repetitive import Repetitive
+    from ...identification.fitted.identified_model import IdentifiedModel
+    from ...references.reference import Reference
+    from ...stages.virtual import VirtualStage
 
 __all__ = [
     "MODEL",
@@ -190,7 +190,7 @@ class Loop:
 
     def pid(self, model: IdentifiedModel | None) -> Pid | None:
         """Make the feedback; the paper's gains are for its own stage only."""
-        from ..control.laws.pid import Pid
+        from ...control.laws.pid import Pid
 
         if not self.has_feedback:
             return None
@@ -232,8 +232,8 @@ class Loop:
         self, model: IdentifiedModel, reference: Reference, kq: float | None, tq: float | None
     ) -> Repetitive:
         """Make the repetitive part; on one's own stage half of an error is learnt in a period."""
-        from ..control.parts.repetitive import Repetitive
-        from ..control.plant import linearised_plants, plant_of
+        from ...control.parts.repetitive import Repetitive
+        from ...control.plant import linearised_plants, plant_of
 
         period = reference.period
         if period is None:
@@ -309,8 +309,8 @@ def simulated(
     """Make the stage of `StageFile`, with the noise [m] of a sensor and a bandwidth [Hz]."""
     from pathlib import Path
 
-    from ..identification.fitted.model_file import load
-    from ..stages.virtual import VirtualStage
+    from ...identification.fitted.model_file import load
+    from ...stages.virtual import VirtualStage
 
     if stage == PAPER:
         return VirtualStage.xu_li_2010(seed=seed)

@@ -9,8 +9,27 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import Interrupted, ParameterError
-from .error_messages import report_errors
+from ...errors import Interrupted, ParameterError
+from ..error_messages import report_errors
+from ..interruption import acknowledge_interrupt
+from ..options import (
+    Columns,
+    DisplacementColumn,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Json,
+    Out,
+    Overwrite,
+    Quiet,
+    Resample,
+    Seconds,
+    TimeColumn,
+    Units,
+    of_file,
+    windowed,
+)
+from ..output import Output
 from .fit_options import (
     AUTO,
     Asymmetry,
@@ -40,33 +59,14 @@ from .fit_options import (
     of_each_log,
     searched,
 )
-from .interruption import acknowledge_interrupt
-from .options import (
-    Columns,
-    DisplacementColumn,
-    DriveColumn,
-    HoldOption,
-    Interval,
-    Json,
-    Out,
-    Overwrite,
-    Quiet,
-    Resample,
-    Seconds,
-    TimeColumn,
-    Units,
-    of_file,
-    windowed,
-)
-from .output import Output
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from ..data.dataset import Dataset
-    from ..identification.fitted.identification import Identification
-    from ..identification.fitted.score import Score
-    from ..identification.problem.records import Record
+    from ...data.dataset import Dataset
+    from ...identification.fitted.identification import Identification
+    from ...identification.fitted.score import Score
+    from ...identification.problem.records import Record
 
 __all__ = ["identify_command"]
 
@@ -207,9 +207,9 @@ def _files(
     kinds: Kinds, logs: list[Dataset], options: FitOptions, *, validated: bool
 ) -> Iterator[str]:
     """Names of all files that the command may write."""
-    from .._support.files.writing import picture_files
-    from ..identification.solve.selection import models_tried
-    from ..identification.views.report import identification_files
+    from ..._support.files.writing import picture_files
+    from ...identification.solve.selection import models_tried
+    from ...identification.views.report import identification_files
 
     names = [name for name in kinds.names if name != AUTO]
     if AUTO in kinds.names:
@@ -227,8 +227,8 @@ def _partial(model: str) -> str:
 
 def _search(records: list[Record], out: Path, kind: str, **arguments: Any) -> Identification:
     """Identify; on Ctrl-C save the best model found so far."""
-    from .._support.files.writing import make_folder
-    from ..identification.fit import identify
+    from ..._support.files.writing import make_folder
+    from ...identification.fit import identify
 
     try:
         return identify(records[0] if len(records) == 1 else records, kind, **arguments)
@@ -259,9 +259,9 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
 
 def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]:
     """Write the model and the pictures, those of a second log too."""
-    from .._support.files.writing import make_folder, result_set, save_figures
-    from ..identification.views.plot import plot_loop, plot_time, what_was_shown
-    from ..identification.views.report import save_identification
+    from ..._support.files.writing import make_folder, result_set, save_figures
+    from ...identification.views.plot import plot_loop, plot_time, what_was_shown
+    from ...identification.views.report import save_identification
 
     name = fit.model.info.name
     figures = {}

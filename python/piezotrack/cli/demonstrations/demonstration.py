@@ -5,22 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from ..control.controller.controller import Controller
-from ..control.laws.pid import Pid
-from ..control.running.track import track
-from ..data import datasets
-from ..data.dataset import Dataset
-from ..identification.fit import identify
-from ..identification.methods.descents import Descents
-from ..references.waveforms import triangle
-from ..stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
-from ..stages.virtual import VirtualStage
+from ...control.controller.controller import Controller
+from ...control.laws.pid import Pid
+from ...control.running.track import track
+from ...data import datasets
+from ...data.dataset import Dataset
+from ...identification.fit import identify
+from ...identification.methods.descents import Descents
+from ...references.waveforms import triangle
+from ...stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ...stages.virtual import VirtualStage
 
 if TYPE_CHECKING:
-    from ..control.loop.tracking import Tracking
-    from ..identification.fitted.identification import Identification
-    from ..identification.fitted.score import Score
-    from ..stages.inverse import Inverse
+    from ...control.loop.tracking import Tracking
+    from ...identification.fitted.identification import Identification
+    from ...identification.fitted.score import Score
+    from ...stages.inverse import Inverse
 
 __all__ = [
     "FEEDBACK",
