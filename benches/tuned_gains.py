@@ -18,9 +18,9 @@ import numpy as np
 import piezotrack as pt
 from piezotrack.references import circle
 from piezotrack.xu_li_2010.apparatus import LIMITS, Apparatus
-from piezotrack.xu_li_2010.fig_06_identification import record, search
-from piezotrack.xu_li_2010.references import SHRUNK, fast, shrunk, slow
-from piezotrack.xu_li_2010.table_2 import PUBLISHED
+from piezotrack.xu_li_2010.experiments.fig_06_identification import record, search
+from piezotrack.xu_li_2010.experiments.references import SHRUNK, fast, shrunk, slow
+from piezotrack.xu_li_2010.experiments.table_2 import PUBLISHED
 
 RATES = (50.0, 1000.0, 5000.0)
 JUDGED = (1001, 1002, 1003)

@@ -15,7 +15,7 @@ from problems import paper as paper_log
 from problems import plays, swelling
 
 import piezotrack as pt
-from piezotrack.xu_li_2010.procedure import SEARCH_BOX
+from piezotrack.xu_li_2010.experiments.procedure import SEARCH_BOX
 
 RUNS = 100
 NEVER = 10**6

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack._support.files import save_figures
+from piezotrack._support.files.writing import save_figures
 from piezotrack.identification.views.plot import (
     plot_convergence,
     plot_loop,

@@ -54,9 +54,9 @@ from .running.track import track as track
 from .timing import Timing as Timing
 from .tuning.goal import Goal as Goal
 from .tuning.goal import TuningSearch as TuningSearch
-from .tuning.h_infinity import MixedSensitivity as MixedSensitivity
-from .tuning.h_infinity import mixed_sensitivity as mixed_sensitivity
-from .tuning.linear_systems import to_control as to_control
+from .tuning.linear.h_infinity import MixedSensitivity as MixedSensitivity
+from .tuning.linear.h_infinity import mixed_sensitivity as mixed_sensitivity
+from .tuning.linear.systems import to_control as to_control
 from .tuning.margins import Margins as Margins
 from .tuning.margins import Spread as Spread
 from .tuning.schedule import Schedule as Schedule

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, runtime_check
 from ... import _core
 from ..._support.arguments import TOO_FAR, expect, number_pair, one_of
 from ..._support.arrays import check_dt
-from ..._support.files import write_document
+from ..._support.files.writing import write_document
 from ..._support.units import shown_unit
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel

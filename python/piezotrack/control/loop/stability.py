@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import _core
 from ..._support.arguments import expect, not_negative
-from ..._support.result import Result
+from ..._support.display.result import Result
 from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ..controller.controller import Controller

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ... import _core
 from ..._support.arguments import as_numbers
-from ..._support.json_text import object_of
+from ..._support.files.json_text import object_of
 from ..._support.messages import quoted
 from ...errors import ParameterError
 from ...identification.fitted.model_entries import parameter_entries

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.progress_bar import ProgressBar
+from ..._support.display.progress_bar import ProgressBar
 from ..._support.units import of_drive
 from ...errors import Interrupted
 from ...stages.registry import stage_class

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..._support.files import make_folder, picture_files, result_set, save_figures
+from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
 from ..._support.units import of_drive, shown_unit
 from ..fitted.notes import start_notes
 from ..methods.descents import Descents
