@@ -10,7 +10,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack._support.statistics import sample_noise
-from piezotrack.identification.fitted.trial import Trial
+from piezotrack.identification.fitted.selection import Trial
 
 DT = 1e-3
 T = DT * np.arange(4000)

@@ -31,8 +31,8 @@ from .fitted.identification import Identification as Identification
 from .fitted.identified_model import IdentifiedModel as IdentifiedModel
 from .fitted.model_file import load as load
 from .fitted.score import Score as Score
+from .fitted.selection import Trial as Trial
 from .fitted.start import Start as Start
-from .fitted.trial import Trial as Trial
 from .methods.descents import Descents as Descents
 from .methods.least_squares import LeastSquares as LeastSquares
 from .methods.particle_swarm import ParticleSwarm as ParticleSwarm

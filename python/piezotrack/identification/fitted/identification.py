@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..methods.least_squares import LeastSquares
     from .estimates import Constraint, Estimate, LagRange, StopReason, SwarmRun
     from .score import Score
-    from .trial import Trial
+    from .selection import Trial
 
     Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from ... import _core
 from ..._support.statistics import sample_noise
 from ...errors import DataError, NumericalError
 from ...stages.registry import model_named
-from ..fitted.trial import Trial
+from ..fitted.selection import Trial
 from .one_model import identify_model
 
 if TYPE_CHECKING:
