@@ -1,10 +1,11 @@
-"""One of the models that a choice between models tried."""
+"""Choice between models: those that were tried, and on what."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
-__all__ = ["Trial"]
+__all__ = ["Selection", "Trial"]
 
 
 class Trial(NamedTuple):
@@ -22,3 +23,27 @@ class Trial(NamedTuple):
     model: str
     title: str
     rms: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Selection:
+    """Choice of ``model="auto"``.
+
+    Attributes
+    ----------
+    trials : tuple of Trial
+        The kinds that were tried, the best first.
+    fitted_until : float or None
+        End of the part of the window that these were fitted to [s]; they were judged on the rest.
+        None where the window is too short for two parts.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> fit = pt.identify(pt.datasets.dbo_training()[3.0:5.0], progress=False)
+    >>> fit.selection.trials[0].model == fit.model.info.name
+    True
+    """
+
+    trials: tuple[Trial, ...]
+    fitted_until: float | None
