@@ -60,9 +60,7 @@ from .tuning.linear.systems import to_control as to_control
 from .tuning.margins import Margins as Margins
 from .tuning.margins import Spread as Spread
 from .tuning.schedule import Schedule as Schedule
-from .tuning.schedule import SchedulePair as SchedulePair
 from .tuning.schedule import schedule as schedule
 from .tuning.tune import tune as tune
 from .tuning.tuned import MarginReport as MarginReport
 from .tuning.tuned import Tuned as Tuned
-from .tuning.tuned import TuningReport as TuningReport

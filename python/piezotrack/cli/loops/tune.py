@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -15,9 +14,6 @@ from ..options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  
 from ..output import Output
 from .loop_options import AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise, noise_metres
 from .track import parsed_reference
-
-if TYPE_CHECKING:
-    from ...control.tuning.tuned import Tuned
 
 __all__ = ["tune_command"]
 
@@ -91,6 +87,7 @@ def tune_command(
     from ...control.tuning.goal import Goal, TuningSearch
     from ...control.tuning.margins import Margins, Spread
     from ...control.tuning.tune import tune
+    from ...control.tuning.tuned import picture_name
     from ...identification.fitted.model_file import load
     from ...stages.virtual import VirtualStage
 
@@ -106,7 +103,7 @@ def tune_command(
     desired = [parsed_reference(text, duration, period) for text in reference or ()]
     settings = Loop(True, dt, limits, None, None, None, None)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    pictures = [name for i in range(len(desired)) for name in picture_files(_name(i))]
+    pictures = [name for i in range(len(desired)) for name in picture_files(picture_name(i))]
     result.will_write(["tuning.json", "controller.json", *pictures])
     tuned = tune(
         [VirtualStage.of(known, noise=noise_metres(noise_nm), bandwidth=bandwidth, seed=seed)],
@@ -124,8 +121,7 @@ def tune_command(
         timing=Timing(delay=delay),
         search=TuningSearch(seed=seed),
     )
-    document = _document(tuned)
-    result.show(str(tuned), document, _write(tuned, document, out))
+    result.show(str(tuned), tuned.document(), tuned.save(out))
 
 
 def _within(option: str, value: float, low: float, high: float, expected: str) -> None:
@@ -147,47 +143,3 @@ def _figure(figure: str, allowed: float | None) -> Any:
     if allowed is not None and not allowed > 0.0:
         raise ParameterError(f"--allowed-um is {allowed:g}: expected an error above 0 um")
     return figure
-
-
-def _name(i: int) -> str:
-    return "tuned" if i == 0 else f"tuned_{i + 1}"
-
-
-def _document(tuned: Tuned) -> dict[str, Any]:
-    """Content of the JSON file: the controller and what it keeps."""
-    from ... import __version__
-
-    controller, report = tuned
-    return {
-        "format": "piezotrack-tuning",
-        "schema_version": 1,
-        "dt": {"value": controller.dt, "unit": "s"},
-        "limits": {"value": list(controller.limits), "unit": controller.drive_unit},
-        "feedback": None if controller.feedback is None else asdict(controller.feedback),
-        "filters": [{"kind": type(one).__name__, **asdict(one)} for one in controller.filters],
-        "repetitive": None if controller.repetitive is None else asdict(controller.repetitive),
-        "unit": "gains in V/m, times in s, frequencies in Hz, errors in m, phase margin in rad",
-        "references": [
-            {"reference": repr(run.reference), "metrics": asdict(run.metrics)}
-            for run in report.runs
-        ],
-        "kept": [one._asdict() for one in report.kept],
-        "plants": list(report.plants),
-        "binding": list(report.active_constraints),
-        "controllers": report.candidates,
-        "loops": report.loops,
-        "provenance": {"package": "piezotrack", "version": __version__},
-    }
-
-
-def _write(tuned: Tuned, document: dict[str, Any], out: Path) -> list[Path]:
-    """Write report and controller as JSON, and a picture of the loop along each reference."""
-    from ..._support.files.writing import make_folder, result_set, save_figures, write_document
-
-    with result_set(make_folder(out)) as folder:
-        pictures = {_name(i): run.plot() for i, run in enumerate(tuned.report.runs)}
-        return [
-            write_document(folder / "tuning.json", document),
-            tuned.controller.save(folder / "controller.json", report=tuned),
-            *save_figures(pictures, folder),
-        ]

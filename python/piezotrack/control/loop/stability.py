@@ -203,6 +203,11 @@ class LoopReport(Result):
         return f"<LoopReport at {self.middle}{elsewhere}>"
 
     @property
+    def controllers(self) -> tuple[Controller]:
+        """The controller, as a tuple."""
+        return (self.controller,)
+
+    @property
     def cases(self) -> tuple[tuple[str, LoopCheck], ...]:
         """Name and stability at each gain."""
         return ("low", self.low), ("middle", self.middle), ("high", self.high)

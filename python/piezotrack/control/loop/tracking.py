@@ -56,7 +56,7 @@ class Metrics(ErrorStatistics):
     widest_loop: float | None
 
     def __str__(self) -> str:
-        text = f"max {1e6 * self.max_error:.3f} um, rms {1e6 * self.rms_error:.3f} um"
+        text = super().__str__()
         if self.phase_lag is not None:
             text += f", phase lag {self.phase_lag:.4f} rad"
         if self.widest_loop is not None:
