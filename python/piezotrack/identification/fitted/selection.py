@@ -9,20 +9,23 @@ __all__ = ["Selection", "Trial"]
 
 
 class Trial(NamedTuple):
-    """One kind of stage that was tried.
+    """A model that was tried.
 
     Attributes
     ----------
     model, title : str
         Name of the model, and its title.
     rms : float
-        Root mean square of the residual on the part that was not fitted [m]; where the record is
-        too short to be parted, on all of it.
+        Root mean square of the residual on the part that was not fitted [m], amplitudes and rates
+        of the drive that differ by a factor of two counting alike.
+    seconds : float
+        Time that it took [s]; 0 where it was read from a file.
     """
 
     model: str
     title: str
     rms: float
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,10 +35,9 @@ class Selection:
     Attributes
     ----------
     trials : tuple of Trial
-        The kinds that were tried, the best first.
-    fitted_until : float or None
+        The models that were tried, the best first.
+    fitted_until : float
         End of the part of the window that these were fitted to [s]; they were judged on the rest.
-        None where the window is too short for two parts.
 
     Examples
     --------
@@ -46,4 +48,4 @@ class Selection:
     """
 
     trials: tuple[Trial, ...]
-    fitted_until: float | None
+    fitted_until: float
