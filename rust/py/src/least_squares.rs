@@ -1,7 +1,7 @@
 //! Identification of a stage's weights by least squares.
 
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, LeastSquaresFit, PlacesKind, RecordFit, WeightsSettings,
+    CreepKind, DynamicsKind, LeastSquaresFit, NodesKind, RecordFit, WeightsSettings,
     identify_weights, resonances,
 };
 use piezotrack_core::math::{FREE, NOT_NEGATIVE, Rows};
@@ -119,14 +119,14 @@ fn fit_weights(
     let checked = || -> Result<_> {
         let records: Result<Vec<_>> =
             question.records.iter().map(OneRecord::weights_record).collect();
-        let places = match (thresholds, count) {
-            (Some(thresholds), _) => PlacesKind::Given(thresholds),
-            (None, Some(count)) => PlacesKind::Spread(count),
-            (None, None) => PlacesKind::Auto,
+        let nodes = match (thresholds, count) {
+            (Some(thresholds), _) => NodesKind::Given(thresholds),
+            (None, Some(count)) => NodesKind::Spread(count),
+            (None, None) => NodesKind::Auto,
         };
         let creep = creep_times.map_or(CreepKind::Auto, CreepKind::Times);
         let dynamics = dynamics_named(dynamics)?;
-        Ok((records?, WeightsSettings { places, zones, creep, dynamics }))
+        Ok((records?, WeightsSettings { nodes, zones, creep, dynamics }))
     };
     let (records, settings) = checked().map_err(|error| raise(&error))?;
     let job = |stop: Stop<'_>| identify_weights(question.model, &records, &settings, stop);

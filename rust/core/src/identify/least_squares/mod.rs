@@ -17,7 +17,7 @@ mod identify_weights;
 mod lag;
 mod layout;
 mod modes;
-mod places;
+mod nodes;
 mod record_path;
 mod result;
 mod settings;
@@ -28,5 +28,5 @@ mod weights_record;
 
 pub use identify_weights::identify_weights;
 pub use result::{LeastSquaresFit, RecordFit};
-pub use settings::{CreepKind, DynamicsKind, PlacesKind, Settings};
+pub use settings::{CreepKind, DynamicsKind, NodesKind, Settings};
 pub use weights_record::{WeightsDelay, WeightsRecord};

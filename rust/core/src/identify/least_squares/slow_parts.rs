@@ -3,7 +3,7 @@
 use super::fit::{Fit, known_drift};
 use super::form::Form;
 use super::lag::best_lag;
-use super::places::split;
+use super::nodes::split;
 use super::settings::{CreepKind, DynamicsKind, FIRST_SHARE, ROUGH, SAME, STEPS, Settings};
 use super::trials::{side_by_side, with_each};
 use crate::identify::parameters::drift::{DRIFT_TIMES, DriftKind, repeats};
@@ -126,7 +126,7 @@ fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
 }
 
 /// Leaves out the drifts that explain too little beside what was chosen after them, as creep and
-/// places: what a drift stood for may be explained by now.
+/// nodes: what a drift stood for may be explained by now.
 pub(super) fn drop_drifts(fit: &mut Fit<'_>) -> Option<()> {
     for r in 0..fit.common.records.len() {
         if fit.common.records[r].drift != DriftKind::Auto || fit.drifts[r].is_none() {
@@ -171,7 +171,7 @@ fn choose_creep<'a>(fit: &mut Fit<'a>, settings: &Settings) -> Option<()> {
     let trials = with_each(&creeps(fit), |times| {
         let mut trial = none.clone();
         trial.restructure(|trial| trial.times.clone_from(times));
-        for share in trial.layout().shares() {
+        for share in trial.layout().creep_weights() {
             trial.x[share] = FIRST_SHARE;
         }
         trial.settle_rigid(STEPS)?;

@@ -7,9 +7,9 @@ use super::fit::{Beginning, Fit};
 use super::form::Form;
 use super::lag::{best_lag, smallest_lag};
 use super::modes::{drop_modes, first_mode};
-use super::places::{add_once, choose_places, few_or_many, spread};
+use super::nodes::{add_once, choose_nodes, few_or_many, spread};
 use super::settings::{
-    CreepKind, DynamicsKind, FIRST_SHARE, MODE_GAIN, PlacesKind, ROUGH, SAME, STEPS, Settings,
+    CreepKind, DynamicsKind, FIRST_SHARE, MODE_GAIN, NodesKind, ROUGH, SAME, STEPS, Settings,
 };
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
@@ -72,12 +72,12 @@ fn thinning(record: &WeightsRecord<'_>) -> usize {
 
 /// The structure, on records that may be thinned.
 fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
-    let places = match &settings.places {
-        PlacesKind::Given(places) => places.clone(),
-        PlacesKind::Spread(count) => spread(common, (*count, 1.0), false),
-        PlacesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
+    let nodes = match &settings.nodes {
+        NodesKind::Given(nodes) => nodes.clone(),
+        NodesKind::Spread(count) => spread(common, (*count, 1.0), false),
+        NodesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
     };
-    let mut fit = Fit::new(common, &places);
+    let mut fit = Fit::new(common, &nodes);
     let every = |one: &WeightsRecord<'_>| one.samples().div_ceil(ROWS);
     fit.every = common.records.iter().map(every).collect();
     fit.settle(ROUGH)?;
@@ -101,7 +101,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     }
     choose_slow(&mut fit, settings)?;
     choose_dynamics_and_creep(&mut fit, settings, mode)?;
-    choose_places(&mut fit, settings)?;
+    choose_nodes(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
     Some(fit)
@@ -184,7 +184,7 @@ fn with_history<'a>(
     let mut trial = fit.clone();
     trial.restructure(|trial| trial.begins[r] = Beginning { history, from });
     if history == History::Fitted {
-        for share in trial.layout().shares() {
+        for share in trial.layout().creep_weights() {
             trial.x[share] = trial.x[share].max(FIRST_SHARE);
         }
     }
@@ -243,7 +243,7 @@ fn choose_histories(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
 /// The history of one record.
 fn choose_history(fit: &mut Fit<'_>, settings: &Settings, r: usize) -> Option<()> {
     let with_once = |fit: &mut Fit<'_>| {
-        if settings.places == PlacesKind::Auto { add_once(fit, HISTORY_GAIN) } else { Some(()) }
+        if settings.nodes == NodesKind::Auto { add_once(fit, HISTORY_GAIN) } else { Some(()) }
     };
     match fit.common.records[r].history {
         Some(History::Settled) => {}
