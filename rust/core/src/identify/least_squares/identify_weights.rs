@@ -3,7 +3,7 @@
 use super::common::Common;
 use super::result::LeastSquaresFit;
 use super::settings::{NodesKind, Settings};
-use super::structure_selection;
+use super::structure::selection;
 use super::weights_record::WeightsRecord;
 use crate::error::{Error, Result, positive};
 use crate::identify::parameters::drift::DriftKind;
@@ -68,7 +68,7 @@ pub fn identify_weights(
     let records =
         seen.map(|(one, (u, y))| WeightsRecord { drive: Drive { u, ..one.drive }, y, ..*one });
     let common = Common::new((model, of), records.collect(), falls, stop);
-    let found = structure_selection::search(&common, settings);
+    let found = selection::search(&common, settings);
     found.map(|fit| fit.result()).transpose()
 }
 

@@ -3,12 +3,12 @@
 use core::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use super::common::Common;
 use super::form::Form;
 use super::layout::{Layout, Own};
-use super::result::{LeastSquaresFit, RecordFit};
-use super::weights_record::{WeightsDelay, WeightsRecord};
 use crate::error::{Error, Result};
+use crate::identify::least_squares::common::Common;
+use crate::identify::least_squares::result::{LeastSquaresFit, RecordFit};
+use crate::identify::least_squares::weights_record::{WeightsDelay, WeightsRecord};
 use crate::identify::parameters::drift::DriftKind;
 use crate::identify::records::history::History;
 use crate::models::{Dynamics, FittedWeights, Relaxation, Signals, SignalsOf, Values};
@@ -16,18 +16,18 @@ use crate::signal::index;
 
 /// Where a record begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Beginning {
+pub(in crate::identify::least_squares) struct Beginning {
     pub history: History,
     /// Voltage that a history which is fitted comes from, V.
     pub from: f64,
 }
 
 /// Signals of all samples of a record, one sample after the other.
-pub(super) type Kept = OnceLock<Arc<[f64]>>;
+pub(in crate::identify::least_squares) type Kept = OnceLock<Arc<[f64]>>;
 
 /// A stage on its way to the best one of its structure.
 #[derive(Clone)]
-pub(super) struct Fit<'a> {
+pub(in crate::identify::least_squares) struct Fit<'a> {
     pub common: &'a Common<'a>,
     /// Thresholds of plays, or levels, V.
     pub nodes: Vec<f64>,
@@ -409,7 +409,7 @@ impl<'a> Fit<'a> {
     }
 
     /// That a simulation was stopped.
-    pub(super) fn stopped() -> Error {
+    pub(in crate::identify::least_squares) fn stopped() -> Error {
         Error::Numerical("the simulation was stopped".into())
     }
 }
@@ -423,7 +423,7 @@ fn signals(common: &Common<'_>, shape: &[f64], nodes: &[f64]) -> Arc<dyn Signals
 }
 
 /// Time constant of a drift of which the caller says so, s.
-pub(super) fn known_drift(record: &WeightsRecord<'_>) -> Option<f64> {
+pub(in crate::identify::least_squares) fn known_drift(record: &WeightsRecord<'_>) -> Option<f64> {
     match record.drift {
         DriftKind::Time(time) => Some(time),
         DriftKind::None | DriftKind::Auto => None,

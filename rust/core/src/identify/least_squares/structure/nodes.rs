@@ -2,9 +2,9 @@
 
 use core::ops::Range;
 
-use super::common::Common;
-use super::fit::Fit;
-use super::settings::{NodesKind, ROUGH, STEPS, Settings};
+use crate::identify::least_squares::common::Common;
+use crate::identify::least_squares::settings::{NodesKind, ROUGH, STEPS, Settings};
+use crate::identify::least_squares::solving::fit::Fit;
 use crate::math::on_all_threads;
 use crate::models::{MOST_PLAYS, Nodes};
 use crate::signal::index;

@@ -22,7 +22,7 @@ const WEIGHT: (f64, f64) = (-0.9, 0.9);
 
 /// Which dynamics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Form {
+pub(in crate::identify::least_squares) enum Form {
     None,
     First,
     /// So many modes in parallel, 1 or 2.

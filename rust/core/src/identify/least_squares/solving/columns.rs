@@ -60,7 +60,7 @@ impl Parts {
 
 /// The columns of a record: weights, dead zones, corners, weights of the creep, numbers of the
 /// dynamics and departures.
-pub(super) struct Columns<'f, 'a> {
+pub(in crate::identify::least_squares) struct Columns<'f, 'a> {
     fit: &'f Fit<'a>,
     walk: Walk<'f, 'a>,
     hold: Hold,

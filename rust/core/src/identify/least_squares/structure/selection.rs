@@ -2,18 +2,18 @@
 //!
 //! Each is decided in turn on the least squares so far, and has to earn its place.
 
-use super::common::{Common, Thinned};
-use super::fit::{Beginning, Fit};
-use super::form::Form;
 use super::lag::{best_lag, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::nodes::{add_once, choose_nodes, few_or_many, spread};
-use super::settings::{
-    CreepKind, DynamicsKind, FIRST_SHARE, MODE_GAIN, NodesKind, ROUGH, SAME, STEPS, Settings,
-};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
-use super::weights_record::WeightsRecord;
+use crate::identify::least_squares::common::{Common, Thinned};
+use crate::identify::least_squares::settings::{
+    CreepKind, DynamicsKind, FIRST_SHARE, MODE_GAIN, NodesKind, ROUGH, SAME, STEPS, Settings,
+};
+use crate::identify::least_squares::solving::fit::{Beginning, Fit};
+use crate::identify::least_squares::solving::form::Form;
+use crate::identify::least_squares::weights_record::WeightsRecord;
 use crate::identify::records::history::History;
 use crate::math::least;
 use crate::signal::{index, range};
@@ -46,7 +46,10 @@ const LONGEST_PHASE: f64 = 0.06;
 const FEW_STEPS: usize = 2;
 
 /// The best stage; `None` where stopped.
-pub(super) fn search<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
+pub(in crate::identify::least_squares) fn search<'a>(
+    common: &'a Common<'a>,
+    settings: &Settings,
+) -> Option<Fit<'a>> {
     let kept: Vec<Thinned> =
         common.records.iter().map(|one| Thinned::of(one, thinning(one))).collect();
     let few = common.thinned(&kept);

@@ -26,7 +26,7 @@ const STRIDE: f64 = LN_2;
 
 /// How many unknowns of the stage there are of each sort, in this order.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Layout {
+pub(in crate::identify::least_squares) struct Layout {
     /// That of the first signal above its least value, then those of the others, m/V.
     pub weights: usize,
     /// Weights of the dead zones.
@@ -41,7 +41,7 @@ pub(super) struct Layout {
 
 /// Where the unknowns are that a record has of its own, which follow those of the stage.
 #[derive(Clone, Debug)]
-pub(super) struct Own {
+pub(in crate::identify::least_squares) struct Own {
     /// Level of each relaxation before the record, beyond its equilibrium, m.
     pub departures: Range<usize>,
     /// Displacement that the sensor shows at rest, m: none or one.

@@ -1,11 +1,13 @@
 //! Which slow parts a record shows: creep of the stage, drift of the sensor.
 
-use super::fit::{Fit, known_drift};
-use super::form::Form;
 use super::lag::best_lag;
 use super::nodes::split;
-use super::settings::{CreepKind, DynamicsKind, FIRST_SHARE, ROUGH, SAME, STEPS, Settings};
 use super::trials::{side_by_side, with_each};
+use crate::identify::least_squares::settings::{
+    CreepKind, DynamicsKind, FIRST_SHARE, ROUGH, SAME, STEPS, Settings,
+};
+use crate::identify::least_squares::solving::fit::{Fit, known_drift};
+use crate::identify::least_squares::solving::form::Form;
 use crate::identify::parameters::drift::{DRIFT_TIMES, DriftKind, repeats};
 use crate::math::{least, on_all_threads};
 use crate::signal::index;
