@@ -48,7 +48,7 @@ const MODELS: [&str; 14] = [
     "input",
     "plays",
     "relays",
-    "places",
+    "nodes",
     "registry",
     "lanes",
     "any_inverse",

@@ -128,11 +128,11 @@ impl PySearch {
         self.outcome.costs.offset
     }
 
-    /// Shares and time constants (s) of the creep.
+    /// Weights and time constants (s) of the creep.
     #[getter]
     fn creep(&self) -> (Vec<f64>, Vec<f64>) {
         let times = self.found.problem.creep_times.clone();
-        (self.outcome.costs.shares[..times.len()].to_vec(), times)
+        (self.outcome.costs.creep_weights[..times.len()].to_vec(), times)
     }
 
     #[getter]

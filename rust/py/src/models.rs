@@ -1,6 +1,6 @@
 //! The list of models: their parameters, their states and their published values.
 
-use piezotrack_core::models::{AnySuperposition, FoundBy, Model, ParameterInfo, Places, Values};
+use piezotrack_core::models::{AnySuperposition, FoundBy, Model, Nodes, ParameterInfo, Values};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
@@ -54,8 +54,8 @@ struct Listed {
     title: &'static str,
     drive_unit: &'static str,
     searched: bool,
-    /// Name of the places of its signals; empty where they have none.
-    places: &'static str,
+    /// Name of the nodes of its signals; empty where they have none.
+    nodes: &'static str,
     parameters: Vec<Parameter>,
     state: Vec<Parameter>,
     published: Vec<&'static str>,
@@ -71,10 +71,10 @@ fn models() -> Vec<Listed> {
             title: info.title,
             drive_unit: info.drive_unit,
             searched: model.found_by() == FoundBy::Swarm,
-            places: match model.superposition().map(AnySuperposition::places) {
-                Some(Places::Thresholds) => "thresholds",
-                Some(Places::Levels) => "levels",
-                Some(Places::None) | None => "",
+            nodes: match model.superposition().map(AnySuperposition::nodes) {
+                Some(Nodes::Thresholds) => "thresholds",
+                Some(Nodes::Levels) => "levels",
+                Some(Nodes::None) | None => "",
             },
             parameters: info.parameters.iter().map(Parameter::of).collect(),
             state: info.state.iter().map(Parameter::of).collect(),

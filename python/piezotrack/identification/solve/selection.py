@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from ...stages.registry import model_named
 from ..fitted.selection import Selection, Trial
 from ..methods.least_squares import LeastSquares
 from .one_model import identify_model
+from .weights import Structure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -106,7 +108,7 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     if not trials.found:
         raise trials.refused or DataError("no model could be fitted")
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
-    fit = identify_model(problem.of_model(best.info), methods.method(best.info), run)
+    fit = identify_model(problem.of_model(best.info), methods.method(best.info), run, best.start)
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
 
 
@@ -118,6 +120,8 @@ class Tried:
     info: ModelInfo
     # Whether its inverse is ill-conditioned.
     ill: bool
+    # Its structure, where least squares have found it.
+    start: Structure | None
 
 
 @dataclass
@@ -132,17 +136,15 @@ class _Trials:
     refused: Exception | None = None
     # Least residual so far, in multiples of the noise.
     least: float = math.inf
-    # The first fit by least squares.
-    simple: Identification | None = None
+    # Structure of the first fit by least squares.
+    start: Structure | None = None
 
     def run(self, info: ModelInfo) -> bool:
         """Try a model; return whether it leaves nothing but noise."""
         begun = time.perf_counter()
         problem, method = self.problem.of_model(info), self.methods.method(info)
-        if self.simple is not None and isinstance(method, LeastSquares):
-            problem, method = resumed(problem, method, self.simple)
         try:
-            fit = identify_model(problem, method, self.how)
+            fit = identify_model(problem, method, self.how, self.start)
             left = [
                 rest.y - fit.simulate(rest, offset=record.offset).x
                 for rest, record in zip(self.rests, fit.records, strict=True)
@@ -151,7 +153,7 @@ class _Trials:
             self.refused = self.refused or error
             return False
         if isinstance(method, LeastSquares):
-            self.simple = self.simple or fit
+            self.start = self.start or Structure.of(fit)
         records = self.problem.records
         counts = np.array(
             [one.weight * len(rest) for one, rest in zip(records, self.rests, strict=True)]
@@ -161,49 +163,14 @@ class _Trials:
         rms = math.sqrt(float(counts @ squares) / float(counts.sum()))
         ill = bool(fit.model._notes(lambda: fit._responses[0]))
         seconds = time.perf_counter() - begun
-        self.found.append(Tried(Trial(info.name, info.title, rms, seconds), info, ill))
+        start = Structure.of(fit) if isinstance(method, LeastSquares) else None
+        trial = Trial(info.name, info.title, rms, seconds)
+        self.found.append(Tried(trial, info, ill, start))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
         noise = np.array([max(sample_noise(rest.y), repeated(rest)) for rest in self.rests])
         plain = np.array([math.sqrt(float(np.mean(one**2))) for one in left])
         self.least = min(self.least, float(np.max(plain / np.maximum(noise, 1e-300))))
         return bool(np.all(plain < AS_NOISE * noise)) and all(is_white(one) for one in left)
-
-
-def resumed(
-    problem: Problem, method: LeastSquares, fit: Identification
-) -> tuple[Problem, LeastSquares]:
-    """Name the structure that a fit by least squares has, where it is not given.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem of another model on the same records.
-    method : LeastSquares
-        Its method.
-    fit : Identification
-        The fit.
-
-    Returns
-    -------
-    Problem, LeastSquares
-        With the histories, drifts, creep and dynamics of the fit.
-    """
-    model: Any = fit.model
-    times = [time for weight, time in zip(model.creep_weights, model.creep_times, strict=True) if weight > 0.0]
-    named: dict[str, Any] = {}
-    if method.creep == "auto":
-        named["creep"] = times or False
-    if method.dynamics == "auto" and not model.mode_weights:
-        lag, mode = model.time_constant is not None, model.frequency is not None
-        named["dynamics"] = "first" if lag else "second" if mode else None
-    records = []
-    for record, found in zip(problem.records, fit.records, strict=True):
-        history = record.history or (found.start.history if found.start else None)
-        drift = record.drift
-        if drift is None and record.offset:
-            drift = False if found.drift is None else found.drift.time
-        records.append(replace(record, history=history, drift=drift))
-    return replace(problem, records=tuple(records)), replace(method, **named)
 
 
 def judged(data: Dataset, left: Array) -> float:
@@ -223,7 +190,7 @@ def judged(data: Dataset, left: Array) -> float:
     """
     turns = _core.turns(data.u, 0.05 * float(np.ptp(data.u)))
     ends = [0, *turns, len(data)]
-    blocks = [slice(a, b) for a, b in zip(ends, ends[1:], strict=False) if b - a > 2]
+    blocks = [slice(a, b) for a, b in pairwise(ends) if b - a > 2]
     if len(blocks) < 2:
         return float(np.mean(left**2))
     size = np.array([np.ptp(data.u[block]) for block in blocks])

@@ -1,21 +1,37 @@
 //! Settings of an identification by least squares, and the constants that its steps share.
 
+use crate::identify::records::history::History;
+use crate::models::Dynamics;
+
 /// Settings of a fit: the unknowns of the stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Thresholds of plays, or levels.
-    pub places: PlacesKind,
+    pub nodes: NodesKind,
     /// Number of dead zones.
     pub zones: usize,
     /// Which creep.
     pub creep: CreepKind,
     /// Which dynamics.
     pub dynamics: DynamicsKind,
+    /// Structure to begin with.
+    pub start: Option<Structure>,
+}
+
+/// Structure of a fit beside its signals, from which that of another model begins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Structure {
+    /// History and time constant of the drift, s, of each record.
+    pub records: Vec<(History, Option<f64>)>,
+    /// Time constants of the creep, s.
+    pub creep_times: Vec<f64>,
+    /// Dynamics.
+    pub dynamics: Dynamics,
 }
 
 /// Thresholds of plays, or levels of a grid.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PlacesKind {
+pub enum NodesKind {
     /// These, V, ascending.
     Given(Vec<f64>),
     /// So many plays, spread evenly up to half of the drive's range; so many intervals between

@@ -3,12 +3,12 @@
 use core::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use super::common::Common;
 use super::form::Form;
 use super::layout::{Layout, Own};
-use super::result::{LeastSquaresFit, RecordFit};
-use super::weights_record::{WeightsDelay, WeightsRecord};
 use crate::error::{Error, Result};
+use crate::identify::least_squares::common::Common;
+use crate::identify::least_squares::result::{LeastSquaresFit, RecordFit};
+use crate::identify::least_squares::weights_record::{WeightsDelay, WeightsRecord};
 use crate::identify::parameters::drift::DriftKind;
 use crate::identify::records::history::History;
 use crate::models::{Dynamics, FittedWeights, Relaxation, Signals, SignalsOf, Values};
@@ -16,21 +16,21 @@ use crate::signal::index;
 
 /// Where a record begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Beginning {
+pub(in crate::identify::least_squares) struct Beginning {
     pub history: History,
     /// Voltage that a history which is fitted comes from, V.
     pub from: f64,
 }
 
 /// Signals of all samples of a record, one sample after the other.
-pub(super) type Kept = OnceLock<Arc<[f64]>>;
+pub(in crate::identify::least_squares) type Kept = OnceLock<Arc<[f64]>>;
 
 /// A stage on its way to the best one of its structure.
 #[derive(Clone)]
-pub(super) struct Fit<'a> {
+pub(in crate::identify::least_squares) struct Fit<'a> {
     pub common: &'a Common<'a>,
     /// Thresholds of plays, or levels, V.
-    pub places: Vec<f64>,
+    pub nodes: Vec<f64>,
     /// Number of dead zones, and what comes to them, m.
     pub zones: usize,
     pub bent: (f64, f64),
@@ -45,7 +45,7 @@ pub(super) struct Fit<'a> {
     pub begins: Vec<Beginning>,
     /// Time constant of the drift of each record, s; `None` where there is none.
     pub drifts: Vec<Option<f64>>,
-    /// Numbers of the shape, and what shape and places make.
+    /// Numbers of the shape, and what shape and nodes make.
     pub shape: Vec<f64>,
     pub signals: Arc<dyn Signals>,
     /// Signals of each record, once they were needed.
@@ -63,17 +63,17 @@ pub(super) struct Fit<'a> {
 }
 
 impl<'a> Fit<'a> {
-    pub fn new(common: &'a Common<'a>, places: &[f64]) -> Self {
+    pub fn new(common: &'a Common<'a>, nodes: &[f64]) -> Self {
         let shape: Vec<f64> = common.of.shapes().iter().map(|one| one.neutral).collect();
         let begin = |history: Option<History>| Beginning {
             history: history.unwrap_or(History::Virgin),
             from: 0.0,
         };
         let mut fit = Self {
-            signals: signals(common, &shape, places),
+            signals: signals(common, &shape, nodes),
             shape,
             common,
-            places: places.to_vec(),
+            nodes: nodes.to_vec(),
             zones: 0,
             bent: (0.0, 0.0),
             times: Vec::new(),
@@ -101,9 +101,9 @@ impl<'a> Fit<'a> {
     pub fn on<'b>(self, common: &'b Common<'b>) -> Fit<'b> {
         Fit {
             common,
-            signals: signals(common, &self.shape, &self.places),
+            signals: signals(common, &self.shape, &self.nodes),
             kept: none_kept(common),
-            places: self.places,
+            nodes: self.nodes,
             times: self.times,
             shape: self.shape,
             windows: windows(common),
@@ -127,7 +127,7 @@ impl<'a> Fit<'a> {
             weights: self.signals.count(),
             bends: self.zones,
             corners: self.zones,
-            shares: self.times.len(),
+            creep_weights: self.times.len(),
             poles: self.form.numbers(),
         }
     }
@@ -161,8 +161,8 @@ impl<'a> Fit<'a> {
     pub fn restructure(&mut self, change: impl FnOnce(&mut Self)) {
         let before = self.clone();
         change(self);
-        if self.places != before.places {
-            self.signals = signals(self.common, &self.shape, &self.places);
+        if self.nodes != before.nodes {
+            self.signals = signals(self.common, &self.shape, &self.nodes);
             self.kept = none_kept(self.common);
         }
         for ((kept, now), was) in self.kept.iter_mut().zip(&self.begins).zip(&before.begins) {
@@ -178,10 +178,10 @@ impl<'a> Fit<'a> {
             }
         };
         let timed = before.times == self.times;
-        keep(now.weights(), was.weights(), before.places == self.places);
+        keep(now.weights(), was.weights(), before.nodes == self.nodes);
         keep(now.bends(), was.bends(), true);
         keep(now.corners(), was.corners(), true);
-        keep(now.shares(), was.shares(), timed);
+        keep(now.creep_weights(), was.creep_weights(), timed);
         keep(now.poles(), was.poles(), before.form == self.form);
         for r in 0..self.common.records.len() {
             let (to, from) = (self.own(r).parts(), before.own(r).parts());
@@ -198,7 +198,7 @@ impl<'a> Fit<'a> {
 
     pub fn reshape(&mut self, i: usize, place: f64) {
         self.shape[i] = place;
-        self.signals = signals(self.common, &self.shape, &self.places);
+        self.signals = signals(self.common, &self.shape, &self.nodes);
         self.kept = none_kept(self.common);
     }
 
@@ -278,9 +278,9 @@ impl<'a> Fit<'a> {
 
     /// Creep and dynamics as they are now.
     pub fn relaxation(&self) -> Result<Relaxation> {
-        let shares: Vec<f64> =
-            self.x[self.layout().shares()].iter().map(|share| share.max(0.0)).collect();
-        Relaxation::new(&shares, &self.times, self.dynamics())
+        let creep_weights: Vec<f64> =
+            self.x[self.layout().creep_weights()].iter().map(|share| share.max(0.0)).collect();
+        Relaxation::new(&creep_weights, &self.times, self.dynamics())
     }
 
     /// Inputs of the columns of weights and dead zones, then that of the stage.
@@ -365,7 +365,7 @@ impl<'a> Fit<'a> {
         let sign = if falls { -1.0 } else { 1.0 };
         let fitted = FittedWeights {
             linear: sign * (self.common.least_linear() + self.x[0]),
-            places: self.places.clone(),
+            nodes: self.nodes.clone(),
             weights: self.x[1..layout.weights]
                 .iter()
                 .map(|weight| sign * weight.max(0.0))
@@ -409,7 +409,7 @@ impl<'a> Fit<'a> {
     }
 
     /// That a simulation was stopped.
-    pub(super) fn stopped() -> Error {
+    pub(in crate::identify::least_squares) fn stopped() -> Error {
         Error::Numerical("the simulation was stopped".into())
     }
 }
@@ -418,12 +418,12 @@ fn none_kept(common: &Common<'_>) -> Vec<Kept> {
     vec![Kept::new(); common.records.len()]
 }
 
-fn signals(common: &Common<'_>, shape: &[f64], places: &[f64]) -> Arc<dyn Signals> {
-    Arc::from(common.of.signals(&SignalsOf { shape, places, drive: common.drive }))
+fn signals(common: &Common<'_>, shape: &[f64], nodes: &[f64]) -> Arc<dyn Signals> {
+    Arc::from(common.of.signals(&SignalsOf { shape, nodes, drive: common.drive }))
 }
 
 /// Time constant of a drift of which the caller says so, s.
-pub(super) fn known_drift(record: &WeightsRecord<'_>) -> Option<f64> {
+pub(in crate::identify::least_squares) fn known_drift(record: &WeightsRecord<'_>) -> Option<f64> {
     match record.drift {
         DriftKind::Time(time) => Some(time),
         DriftKind::None | DriftKind::Auto => None,

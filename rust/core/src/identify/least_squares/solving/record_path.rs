@@ -14,13 +14,13 @@ const MOST_KEPT: usize = 1 << 22;
 
 /// Signals of a drive, and the memory that they come from.
 #[derive(Clone, Debug)]
-pub(super) struct Path {
+pub(in crate::identify::least_squares) struct Path {
     pub memory: Vec<f64>,
     pub signals: Vec<f64>,
 }
 
 /// The signals of a record, sample by sample.
-pub(super) struct Walk<'f, 'a> {
+pub(in crate::identify::least_squares) struct Walk<'f, 'a> {
     fit: &'f Fit<'a>,
     r: usize,
     k: usize,
@@ -189,7 +189,7 @@ impl<'a> Fit<'a> {
 /// A reading that comes late, on straight lines between samples; before the first sample the stage
 /// is where it starts.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Late(FractionalDelay);
+pub(in crate::identify::least_squares) struct Late(FractionalDelay);
 
 impl Late {
     pub fn new(delay: f64, dt: f64) -> Self {

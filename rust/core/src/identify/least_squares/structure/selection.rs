@@ -2,20 +2,21 @@
 //!
 //! Each is decided in turn on the least squares so far, and has to earn its place.
 
-use super::common::{Common, Thinned};
-use super::fit::{Beginning, Fit};
-use super::form::Form;
 use super::lag::{best_lag, smallest_lag};
 use super::modes::{drop_modes, first_mode};
-use super::places::{add_once, choose_places, few_or_many, spread};
+use super::nodes::{add_once, choose_nodes, few_or_many, spread};
 use super::refinement::Refinement;
-use super::settings::{
-    CreepKind, DynamicsKind, FIRST_SHARE, HISTORY_GAIN, MODE_GAIN, PlacesKind, ROUGH, SAME, STEPS,
-    Settings, UNSEEN_GAIN,
-};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
-use super::weights_record::WeightsRecord;
+use crate::identify::least_squares::common::{Common, Thinned};
+use crate::identify::least_squares::settings::{
+    CreepKind, DynamicsKind, FIRST_SHARE, HISTORY_GAIN, MODE_GAIN, NodesKind, ROUGH, SAME, STEPS,
+    Settings, Structure, UNSEEN_GAIN,
+};
+use crate::identify::least_squares::solving::fit::{Beginning, Fit};
+use crate::identify::least_squares::solving::form::Form;
+use crate::identify::least_squares::weights_record::WeightsRecord;
+use crate::identify::parameters::drift::DriftKind;
 use crate::identify::records::history::History;
 use crate::math::least;
 use crate::signal::{index, range};
@@ -45,7 +46,10 @@ const LONGEST_PHASE: f64 = 0.06;
 const FEW_STEPS: usize = 2;
 
 /// The best stage; `None` where stopped.
-pub(super) fn search<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
+pub(in crate::identify::least_squares) fn search<'a>(
+    common: &'a Common<'a>,
+    settings: &Settings,
+) -> Option<Fit<'a>> {
     let kept: Vec<Thinned> =
         common.records.iter().map(|one| Thinned::of(one, thinning(one))).collect();
     let few = common.thinned(&kept);
@@ -71,12 +75,12 @@ fn thinning(record: &WeightsRecord<'_>) -> usize {
 
 /// The structure, on records that may be thinned.
 fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
-    let places = match &settings.places {
-        PlacesKind::Given(places) => places.clone(),
-        PlacesKind::Spread(count) => spread(common, (*count, 1.0), false),
-        PlacesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
+    let nodes = match &settings.nodes {
+        NodesKind::Given(nodes) => nodes.clone(),
+        NodesKind::Spread(count) => spread(common, (*count, 1.0), false),
+        NodesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
     };
-    let mut fit = Fit::new(common, &places);
+    let mut fit = Fit::new(common, &nodes);
     let every = |one: &WeightsRecord<'_>| {
         let rows = if one.measures().excited().is_some() { EXCITED_ROWS } else { ROWS };
         one.samples().div_ceil(rows)
@@ -86,6 +90,9 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     search_shape(&mut fit)?;
     place_corners(&mut fit, settings.zones);
     fit.settle(ROUGH)?;
+    if let Some(start) = &settings.start {
+        return resumed(fit, settings, start);
+    }
     let mode = first_mode(&mut fit, settings)?;
     if let CreepKind::Times(times) = &settings.creep {
         fit.restructure(|fit| fit.times.clone_from(times));
@@ -96,8 +103,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     if fit.common.records.len() == 1 && fit.common.records[0].history.is_none() {
         starts.extend([History::Virgin, History::Settled, History::Fitted].map(Some));
     }
-    let begun =
-        with_each(&starts, |history| with_slow_and_late(&fit, settings, mode, *history))?;
+    let begun = with_each(&starts, |history| with_slow_and_late(&fit, settings, mode, *history))?;
     let found = with_each(&begun, |start| {
         let mut trial = start.clone();
         refinement.refine(&mut trial)?;
@@ -106,8 +112,39 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     let better =
         |a: Fit<'a>, b: Fit<'a>| if refinement.cost(&b) < refinement.cost(&a) { b } else { a };
     let mut fit = found.into_iter().reduce(better)?;
-    choose_places(&mut fit, settings)?;
+    choose_nodes(&mut fit, settings)?;
     refinement.refine(&mut fit)?;
+    drop_drifts(&mut fit)?;
+    replace_corners(&mut fit)?;
+    Some(fit)
+}
+
+/// The structure from that of another model.
+fn resumed<'a>(mut fit: Fit<'a>, settings: &Settings, start: &Structure) -> Option<Fit<'a>> {
+    let (form, poles) = Form::of(&start.dynamics);
+    for (r, (history, drift)) in start.records.iter().enumerate().take(fit.begins.len()) {
+        let record = &fit.common.records[r];
+        let (history, from) = (record.history.unwrap_or(*history), record.drive.u[0]);
+        let chosen = record.drift == DriftKind::Auto;
+        fit.restructure(|fit| {
+            fit.begins[r] = Beginning { history, from };
+            fit.drifts[r] = if chosen { *drift } else { fit.drifts[r] };
+        });
+    }
+    fit.restructure(|fit| fit.times.clone_from(&start.creep_times));
+    for slot in fit.layout().creep_weights() {
+        fit.x[slot] = FIRST_SHARE;
+    }
+    fit.set_poles(form, &poles);
+    fit.settle(ROUGH)?;
+    for r in 0..fit.begins.len() {
+        if fit.begins[r].history == History::Fitted {
+            fit = fitted_history(&fit, r)?;
+        }
+    }
+    let refinement = Refinement { settings, shown: matches!(form, Form::Modes(_)) };
+    refinement.refine(&mut fit)?;
+    choose_nodes(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
     Some(fit)
@@ -221,7 +258,7 @@ pub(super) fn with_history<'a>(
     let mut trial = fit.clone();
     trial.restructure(|trial| trial.begins[r] = Beginning { history, from });
     if history == History::Fitted {
-        for share in trial.layout().shares() {
+        for share in trial.layout().creep_weights() {
             trial.x[share] = trial.x[share].max(FIRST_SHARE);
         }
     }
@@ -286,7 +323,7 @@ fn choose_histories(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
 /// The history of one record.
 fn choose_history(fit: &mut Fit<'_>, settings: &Settings, r: usize) -> Option<()> {
     let with_once = |fit: &mut Fit<'_>| {
-        if settings.places == PlacesKind::Auto { add_once(fit, HISTORY_GAIN) } else { Some(()) }
+        if settings.nodes == NodesKind::Auto { add_once(fit, HISTORY_GAIN) } else { Some(()) }
     };
     match fit.common.records[r].history {
         Some(History::Settled) => {}

@@ -1,12 +1,12 @@
-//! The places of a fit: thresholds of plays, or levels; how many, and where.
+//! The nodes of a fit: thresholds of plays, or levels; how many, and where.
 
 use core::ops::Range;
 
-use super::common::Common;
-use super::fit::Fit;
-use super::settings::{PlacesKind, ROUGH, SAME, STEPS, Settings};
+use crate::identify::least_squares::common::Common;
+use crate::identify::least_squares::settings::{NodesKind, ROUGH, SAME, STEPS, Settings};
+use crate::identify::least_squares::solving::fit::Fit;
 use crate::math::on_all_threads;
-use crate::models::{MOST_PLAYS, Places};
+use crate::models::{MOST_PLAYS, Nodes};
 use crate::signal::index;
 
 /// Share of the deviation on what they were not fitted to that other plays have to take away.
@@ -33,14 +33,14 @@ const ROUNDS: usize = 5;
 /// Weight of a play that counts, as a share of all.
 const LEAST_WEIGHT: f64 = 1e-3;
 
-/// Places to begin with: few plays take a rounded loop for a lag, many need samples.
+/// Nodes to begin with: few plays take a rounded loop for a lag, many need samples.
 pub(super) fn few_or_many(common: &Common<'_>) -> usize {
     let few = common.samples() < MANY_SAMPLES;
-    match common.of.places() {
-        Places::None => 0,
-        Places::Thresholds if few => FEW_PLAYS,
-        Places::Thresholds => PLAYS,
-        Places::Levels => LEVELS,
+    match common.of.nodes() {
+        Nodes::None => 0,
+        Nodes::Thresholds if few => FEW_PLAYS,
+        Nodes::Thresholds => PLAYS,
+        Nodes::Levels => LEVELS,
     }
 }
 
@@ -50,13 +50,13 @@ pub(super) fn few_or_many(common: &Common<'_>) -> usize {
 /// and never back: with `once` one further threshold stands for all of them.
 /// Levels divide all of the range that the drives reach.
 pub(super) fn spread(common: &Common<'_>, (count, power): (usize, f64), once: bool) -> Vec<f64> {
-    match common.of.places() {
-        Places::None => Vec::new(),
-        Places::Thresholds => {
+    match common.of.nodes() {
+        Nodes::None => Vec::new(),
+        Nodes::Thresholds => {
             let part = |i: usize| libm::pow(index(i) / index(count + 1), power);
             (1..=count + usize::from(once)).map(|i| reach(common) * part(i)).collect()
         }
-        Places::Levels => {
+        Nodes::Levels => {
             let (low, high) = common.reached();
             (0..=count).map(|i| low + (high - low) * index(i) / index(count)).collect()
         }
@@ -65,19 +65,19 @@ pub(super) fn spread(common: &Common<'_>, (count, power): (usize, f64), once: bo
 
 /// Whether one of the plays moves once and never back.
 fn has_once(fit: &Fit<'_>) -> bool {
-    let plays = fit.common.of.places() == Places::Thresholds;
-    plays && fit.places.last().is_some_and(|last| *last >= reach(fit.common))
+    let plays = fit.common.of.nodes() == Nodes::Thresholds;
+    plays && fit.nodes.last().is_some_and(|last| *last >= reach(fit.common))
 }
 
 /// Adds the play that moves once where it explains more than a share `gain` of the deviation: less
 /// would give it a weight by chance.
 pub(super) fn add_once(fit: &mut Fit<'_>, gain: f64) -> Option<()> {
-    if fit.common.of.places() != Places::Thresholds {
+    if fit.common.of.nodes() != Nodes::Thresholds {
         return Some(());
     }
     let mut trial = fit.clone();
     let kept = fit.x[fit.layout().weights()].to_vec();
-    trial.restructure(|trial| trial.places.push(reach(trial.common)));
+    trial.restructure(|trial| trial.nodes.push(reach(trial.common)));
     trial.x[..kept.len()].copy_from_slice(&kept);
     trial.settle(ROUGH)?;
     if trial.rms < (1.0 - gain) * fit.rms {
@@ -86,12 +86,12 @@ pub(super) fn add_once(fit: &mut Fit<'_>, gain: f64) -> Option<()> {
     Some(())
 }
 
-/// Numbers of places that are tried.
-fn tried(places: Places) -> &'static [(usize, f64)] {
-    match places {
-        Places::None => &[],
-        Places::Thresholds => &TRIED,
-        Places::Levels => &TRIED_LEVELS,
+/// Numbers of nodes that are tried.
+fn tried(nodes: Nodes) -> &'static [(usize, f64)] {
+    match nodes {
+        Nodes::None => &[],
+        Nodes::Thresholds => &TRIED,
+        Nodes::Levels => &TRIED_LEVELS,
     }
 }
 
@@ -107,8 +107,8 @@ pub(super) fn split(window: &Range<usize>) -> usize {
 }
 
 /// Other plays, where they foretell a part of the window that they were not fitted to.
-pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
-    if settings.places != PlacesKind::Auto {
+pub(super) fn choose_nodes(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+    if settings.nodes != NodesKind::Auto {
         return Some(());
     }
     let mut here = fit.clone();
@@ -124,25 +124,25 @@ pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()
     let trials = |&(count, power): &(usize, f64)| {
         let mut trial = here.clone();
         let thresholds = spread(trial.common, (count, power), once);
-        trial.restructure(|trial| trial.places = thresholds);
+        trial.restructure(|trial| trial.nodes = thresholds);
         trial.settle_rigid(STEPS)?;
         let few = if count == MANY_PLAYS { gathered(&trial)? } else { None };
         let both = [Some(trial), few].into_iter().flatten();
-        Some(both.map(|trial| (foretold(&trial), trial.places)).collect::<Vec<_>>())
+        Some(both.map(|trial| (foretold(&trial), trial.nodes)).collect::<Vec<_>>())
     };
     let found: Option<Vec<_>> =
-        on_all_threads(tried(fit.common.of.places()), &trials).into_iter().collect();
+        on_all_threads(tried(fit.common.of.nodes()), &trials).into_iter().collect();
     let mut least = (1.0 - PLAYS_GAIN) * foretold(&here);
     let mut best = None;
-    for (rms, places) in found?.into_iter().flatten() {
+    for (rms, nodes) in found?.into_iter().flatten() {
         if rms < least {
             least = (1.0 - PLAYS_GAIN) * rms;
-            best = Some(places);
+            best = Some(nodes);
         }
     }
     if let Some(thresholds) = best {
         let mut trial = fit.clone();
-        trial.restructure(|trial| trial.places = thresholds);
+        trial.restructure(|trial| trial.nodes = thresholds);
         trial.settle(ROUGH)?;
         if trial.rms < SAME * fit.rms {
             *fit = trial;
@@ -156,11 +156,11 @@ pub(super) fn choose_places(fit: &mut Fit<'_>, settings: &Settings) -> Option<()
 #[expect(clippy::option_option, reason = "stopped, or none")]
 fn gathered<'a>(fit: &Fit<'a>) -> Option<Option<Fit<'a>>> {
     // Weights that are not those of single plays gather nowhere.
-    if fit.layout().weights <= fit.places.len() {
+    if fit.layout().weights <= fit.nodes.len() {
         return Some(None);
     }
     let mut trial = fit.clone();
-    let mut gap = reach(fit.common) / index(fit.places.len() + 1);
+    let mut gap = reach(fit.common) / index(fit.nodes.len() + 1);
     for _ in 0..ROUNDS {
         let middle = middles(&trial, 1.1 * gap);
         if middle.is_empty() || 2 * middle.len() > MOST_PLAYS {
@@ -170,11 +170,11 @@ fn gathered<'a>(fit: &Fit<'a>) -> Option<Option<Fit<'a>>> {
         let mut pairs: Vec<f64> =
             middle.iter().flat_map(|at| [f64::max(at - 0.5 * gap, 0.0), at + 0.5 * gap]).collect();
         pairs.sort_by(f64::total_cmp);
-        trial.restructure(|trial| trial.places = pairs);
+        trial.restructure(|trial| trial.nodes = pairs);
         trial.settle_rigid(STEPS)?;
     }
     let middle = middles(&trial, 1.1 * gap);
-    trial.restructure(|trial| trial.places = middle);
+    trial.restructure(|trial| trial.nodes = middle);
     trial.settle_rigid(STEPS)?;
     Some(Some(trial))
 }
@@ -183,7 +183,7 @@ fn gathered<'a>(fit: &Fit<'a>) -> Option<Option<Fit<'a>>> {
 fn middles(fit: &Fit<'_>, width: f64) -> Vec<f64> {
     let weights = &fit.x[1..fit.layout().weights];
     let least = LEAST_WEIGHT * weights.iter().sum::<f64>();
-    let counts = fit.places.iter().zip(weights).filter(|(_, weight)| **weight > least);
+    let counts = fit.nodes.iter().zip(weights).filter(|(_, weight)| **weight > least);
     let mut found: Vec<f64> = Vec::new();
     let mut alone: Option<(f64, f64)> = None;
     for (&at, &weight) in counts {

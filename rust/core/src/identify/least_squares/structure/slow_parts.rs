@@ -1,11 +1,13 @@
 //! Which slow parts a record shows: creep of the stage, drift of the sensor.
 
-use super::fit::{Fit, known_drift};
-use super::form::Form;
 use super::lag::best_lag;
-use super::places::split;
-use super::settings::{CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, ROUGH, SAME, STEPS, Settings};
+use super::nodes::split;
 use super::trials::{side_by_side, with_each};
+use crate::identify::least_squares::settings::{
+    CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, ROUGH, SAME, STEPS, Settings,
+};
+use crate::identify::least_squares::solving::fit::{Fit, known_drift};
+use crate::identify::least_squares::solving::form::Form;
 use crate::identify::parameters::drift::{DRIFT_TIMES, DriftKind, repeats};
 use crate::math::{least, on_all_threads};
 use crate::signal::index;
@@ -122,7 +124,7 @@ fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
 }
 
 /// Leaves out the drifts that explain too little beside what was chosen after them, as creep and
-/// places: what a drift stood for may be explained by now.
+/// nodes: what a drift stood for may be explained by now.
 pub(super) fn drop_drifts(fit: &mut Fit<'_>) -> Option<()> {
     for r in 0..fit.common.records.len() {
         if fit.common.records[r].drift != DriftKind::Auto || fit.drifts[r].is_none() {
@@ -167,7 +169,7 @@ fn choose_creep<'a>(fit: &mut Fit<'a>, settings: &Settings) -> Option<()> {
     let trials = with_each(&creeps(fit), |times| {
         let mut trial = none.clone();
         trial.restructure(|trial| trial.times.clone_from(times));
-        for share in trial.layout().shares() {
+        for share in trial.layout().creep_weights() {
             trial.x[share] = FIRST_SHARE;
         }
         trial.settle_rigid(STEPS)?;

@@ -1,8 +1,8 @@
 //! Lag of a fit by least squares: the best one, and the smallest that explains a record as well.
 
-use super::fit::Fit;
-use super::form::Form;
-use super::settings::{ROUGH, SAME, STEPS};
+use crate::identify::least_squares::settings::{ROUGH, SAME, STEPS};
+use crate::identify::least_squares::solving::fit::Fit;
+use crate::identify::least_squares::solving::form::Form;
 
 /// Ratio of neighbouring lags that are tried.
 const LAG_SPREAD: f64 = 2.5;

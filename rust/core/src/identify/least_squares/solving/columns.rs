@@ -58,9 +58,9 @@ impl Parts {
     }
 }
 
-/// The columns of a record: weights, dead zones, corners, creep shares, numbers of the dynamics and
-/// departures.
-pub(super) struct Columns<'f, 'a> {
+/// The columns of a record: weights, dead zones, corners, weights of the creep, numbers of the
+/// dynamics and departures.
+pub(in crate::identify::least_squares) struct Columns<'f, 'a> {
     fit: &'f Fit<'a>,
     walk: Walk<'f, 'a>,
     hold: Hold,
@@ -106,7 +106,7 @@ impl<'f, 'a> Columns<'f, 'a> {
         let mut followers: Vec<Follower> = first.iter().zip(&creep).map(ready).collect();
         let stage = followers[inner];
         followers.resize(width, Follower::at_rest(&parts.whole.0, 0.0, &[]));
-        let departed = &fit.x[layout.shares()][..own.departures.len()];
+        let departed = &fit.x[layout.creep_weights()][..own.departures.len()];
         Ok(Self {
             reached: creep.last().map_or(&[][..], Vec::as_slice).iter().map(bare).collect(),
             left: departed.to_vec(),

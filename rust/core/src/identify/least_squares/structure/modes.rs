@@ -1,9 +1,9 @@
 //! Which modes a fit has.
 
-use super::fit::Fit;
-use super::form::Form;
-use super::settings::{DynamicsKind, MODE_GAIN, ROUGH, Settings};
-use super::weights_record::WeightsRecord;
+use crate::identify::least_squares::settings::{DynamicsKind, MODE_GAIN, ROUGH, Settings};
+use crate::identify::least_squares::solving::fit::Fit;
+use crate::identify::least_squares::solving::form::Form;
+use crate::identify::least_squares::weights_record::WeightsRecord;
 use crate::identify::records::resonances::{Resonance, resonances};
 
 /// Modes that are looked for.

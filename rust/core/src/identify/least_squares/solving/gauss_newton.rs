@@ -6,9 +6,9 @@ use std::collections::VecDeque;
 use super::columns::Columns;
 use super::fit::Fit;
 use super::record_path::Late;
-use super::settings::{ROUGH, STEPS};
-use super::weights_record::{WeightsDelay, WeightsRecord};
 use crate::error::Result;
+use crate::identify::least_squares::settings::{ROUGH, STEPS};
+use crate::identify::least_squares::weights_record::{WeightsDelay, WeightsRecord};
 use crate::math::Rows;
 
 /// Weight of a row that holds a sum at its bound, relative to all others together.

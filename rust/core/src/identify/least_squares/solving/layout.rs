@@ -26,22 +26,22 @@ const STRIDE: f64 = LN_2;
 
 /// How many unknowns of the stage there are of each sort, in this order.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Layout {
+pub(in crate::identify::least_squares) struct Layout {
     /// That of the first signal above its least value, then those of the others, m/V.
     pub weights: usize,
     /// Weights of the dead zones.
     pub bends: usize,
     /// Thresholds of the dead zones, m, as many.
     pub corners: usize,
-    /// Shares of the creep.
-    pub shares: usize,
+    /// Weights of the creep.
+    pub creep_weights: usize,
     /// Logarithms of the numbers of the dynamics.
     pub poles: usize,
 }
 
 /// Where the unknowns are that a record has of its own, which follow those of the stage.
 #[derive(Clone, Debug)]
-pub(super) struct Own {
+pub(in crate::identify::least_squares) struct Own {
     /// Level of each relaxation before the record, beyond its equilibrium, m.
     pub departures: Range<usize>,
     /// Displacement that the sensor shows at rest, m: none or one.
@@ -98,12 +98,12 @@ impl Layout {
         self.bends().end..self.bends().end + self.corners
     }
 
-    pub fn shares(&self) -> Range<usize> {
-        self.corners().end..self.corners().end + self.shares
+    pub fn creep_weights(&self) -> Range<usize> {
+        self.corners().end..self.corners().end + self.creep_weights
     }
 
     pub fn poles(&self) -> Range<usize> {
-        self.shares().end..self.shares().end + self.poles
+        self.creep_weights().end..self.creep_weights().end + self.poles
     }
 
     /// Unknowns of the stage.
@@ -122,7 +122,7 @@ impl Layout {
         let mut bounds = vec![NOT_NEGATIVE; self.weights];
         bounds.extend(vec![BEND; self.bends]);
         bounds.extend(Self::near(&x[self.corners()], corners));
-        bounds.extend(vec![(0.0, MOST_CREEP); self.shares]);
+        bounds.extend(vec![(0.0, MOST_CREEP); self.creep_weights]);
         let stride = if held { 0.0 } else { STRIDE };
         bounds.extend(x[self.poles()].iter().zip(ranges).map(|(at, (low, high))| {
             let at = at.min(*high).max(*low);
@@ -147,7 +147,7 @@ impl Layout {
         let bends = self.bends();
         let slopes = (bends.start + 1..bends.end)
             .map(|end| (bends.start..end + 1, (SLOPE.0 - 1.0, SLOPE.1 - 1.0)));
-        let creep = (self.shares > 1).then(|| (self.shares(), (0.0, MOST_CREEP)));
+        let creep = (self.creep_weights > 1).then(|| (self.creep_weights(), (0.0, MOST_CREEP)));
         slopes.chain(creep).collect()
     }
 
@@ -159,7 +159,7 @@ impl Layout {
         })
     }
 
-    /// Names of the unknowns that lie on a bound, but for shares and weights of 0.
+    /// Names of the unknowns that lie on a bound, but for weights of 0.
     pub fn at_bound(&self, x: &[f64], form: Form, ranges: &[(f64, f64)]) -> Vec<String> {
         let near = |value: f64, bound: f64| (value - bound).abs() < 1e-3;
         let mut names = Vec::new();
@@ -169,7 +169,7 @@ impl Layout {
                 names.push(format!("dead_zone_weights[{j}]"));
             }
         }
-        if near(x[self.shares()].iter().sum(), MOST_CREEP) {
+        if near(x[self.creep_weights()].iter().sum(), MOST_CREEP) {
             names.push("creep_weights".into());
         }
         let poles = form.names().iter().zip(&x[self.poles()]).zip(ranges);

@@ -1,10 +1,10 @@
-//! Shares of the creep, by least squares within the cost of a candidate.
+//! Weights of the creep, by least squares within the cost of a candidate.
 //!
 //! ```text
 //! y = xm + sum_j c_j q_j + offset + e,   c_j >= 0,   sum_j c_j <= 1/2
 //! ```
 //!
-//! With given time constants the displacement is linear in the shares c, so their best values
+//! With given time constants the displacement is linear in the weights c, so their best values
 //! follow for each candidate from sums over the records, and no swarm searches them: variable
 //! projection, Golub and Pereyra 1973, doi 10.1137/0710036.
 
@@ -13,9 +13,9 @@ use crate::error::{Error, Result, positive};
 use crate::signal::{index, range, turns};
 
 /// Most relaxations of the creep in a search.
-pub const MOST_SHARES: usize = 3;
+pub const MOST_CREEP_WEIGHTS: usize = 3;
 
-/// Largest sum of the shares: creep that adds more is no creep.
+/// Largest sum of the weights: creep that adds more is no creep.
 pub const MOST_CREEP: f64 = 0.5;
 
 /// A pivot below this part of its diagonal is 0: the column is a combination of the others.
@@ -24,17 +24,17 @@ pub(in crate::identify) const LEAST_PIVOT: f64 = 1e-12;
 /// Movement left to a column that is a combination of others, but for [`LEAST_PIVOT`].
 pub(in crate::identify) const SLACK: f64 = 1e-6;
 
-/// Shares of the relaxations; 0 for those that there are not.
-pub type Shares = [f64; MOST_SHARES];
+/// Weights of the relaxations; 0 for those that there are not.
+pub type CreepWeights = [f64; MOST_CREEP_WEIGHTS];
 
-/// Directions in which the shares can move to both sides: those above 0, against each other only
+/// Directions in which the weights can move to both sides: those above 0, against each other only
 /// where their sum is the largest.
-pub(in crate::identify) fn directions(shares: &Shares) -> Vec<Shares> {
-    let mut free = (0..MOST_SHARES).filter(|&j| shares[j] > 0.0);
-    let full = shares.iter().sum::<f64>() >= MOST_CREEP * (1.0 - LEAST_PIVOT);
+pub(in crate::identify) fn directions(creep_weights: &CreepWeights) -> Vec<CreepWeights> {
+    let mut free = (0..MOST_CREEP_WEIGHTS).filter(|&j| creep_weights[j] > 0.0);
+    let full = creep_weights.iter().sum::<f64>() >= MOST_CREEP * (1.0 - LEAST_PIVOT);
     let against = if full { free.next() } else { None };
     let direction = |j: usize| {
-        let mut direction = [0.0; MOST_SHARES];
+        let mut direction = [0.0; MOST_CREEP_WEIGHTS];
         direction[j] = 1.0;
         if let Some(other) = against {
             direction[other] = -1.0;
@@ -46,8 +46,8 @@ pub(in crate::identify) fn directions(shares: &Shares) -> Vec<Shares> {
 
 /// Refuses time constants that a search cannot use.
 pub(in crate::identify) fn check_times(times: &[f64]) -> Result<()> {
-    if times.len() > MOST_SHARES {
-        let expected = format!("{MOST_SHARES} time constants at most");
+    if times.len() > MOST_CREEP_WEIGHTS {
+        let expected = format!("{MOST_CREEP_WEIGHTS} time constants at most");
         return Err(Error::parameter("creep", format!("{} entries", times.len()), expected));
     }
     for (j, &time) in times.iter().enumerate() {

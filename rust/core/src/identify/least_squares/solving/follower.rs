@@ -5,7 +5,7 @@ use crate::signal::Hold;
 
 /// Creep and dynamics behind one signal of a record, from an equilibrium on.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Follower {
+pub(in crate::identify::least_squares) struct Follower {
     pub state: RelaxationState,
     /// Input of the latest sample.
     pub before: f64,

@@ -7,16 +7,16 @@
 //! take away: residuals of models are correlated, so that criteria that count independent samples,
 //! as Akaike's, would take every part.
 
-use super::fit::Fit;
-use super::form::Form;
 use super::lag::best_lag;
-use super::settings::{
-    CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, HISTORY_GAIN, LAG_GAIN, MODE_GAIN, ROUGH,
-    Settings, UNSEEN_GAIN,
-};
+use super::selection::{fitted_history, is_mode, nearer, unseen_mode, with_history};
 use super::slow_parts::{creeps, with_drift};
-use super::structure_selection::{fitted_history, unseen_mode, is_mode, nearer, with_history};
 use super::trials::{Trial, settled_all, with_each};
+use crate::identify::least_squares::settings::{
+    CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, HISTORY_GAIN, LAG_GAIN,
+    MODE_GAIN, ROUGH, Settings, UNSEEN_GAIN,
+};
+use crate::identify::least_squares::solving::fit::Fit;
+use crate::identify::least_squares::solving::form::Form;
 use crate::identify::parameters::drift::{DriftKind, repeats};
 use crate::identify::records::history::History;
 use crate::signal::range;
@@ -147,7 +147,8 @@ impl Refinement<'_> {
         let from = &from;
         let mut ways: Vec<Way<'_, '_>> = Vec::new();
         let free = self.settings.creep == CreepKind::Auto;
-        let lags = self.settings.dynamics == DynamicsKind::Auto && !matches!(from.form, Form::Modes(_));
+        let lags =
+            self.settings.dynamics == DynamicsKind::Auto && !matches!(from.form, Form::Modes(_));
         let mut creep = if free { creeps(from) } else { Vec::new() };
         if free {
             creep.push(decades(from));
@@ -193,13 +194,9 @@ impl Refinement<'_> {
                     Some(bare)
                 }));
             } else {
-                ways.push(Box::new(move || {
-                    with_drift(from, r)
-                }));
+                ways.push(Box::new(move || with_drift(from, r)));
                 if free && !from.times.is_empty() {
-                    ways.push(Box::new(move || {
-                        with_drift(&with_creep(from, &[])?, r)
-                    }));
+                    ways.push(Box::new(move || with_drift(&with_creep(from, &[])?, r)));
                 }
             }
         }
@@ -300,7 +297,7 @@ fn decades(fit: &Fit<'_>) -> Vec<f64> {
 fn with_creep<'a>(from: &Fit<'a>, times: &[f64]) -> Option<Fit<'a>> {
     let mut trial = from.clone();
     trial.restructure(|trial| trial.times = times.to_vec());
-    for share in trial.layout().shares() {
+    for share in trial.layout().creep_weights() {
         trial.x[share] = FIRST_SHARE;
     }
     trial.settle_rigid(FEW_STEPS)?;
@@ -310,9 +307,9 @@ fn with_creep<'a>(from: &Fit<'a>, times: &[f64]) -> Option<Fit<'a>> {
 /// The same with the weights of the relaxations kept.
 fn with_times<'a>(from: &Fit<'a>, times: &[f64]) -> Option<Fit<'a>> {
     let mut trial = from.clone();
-    let shares = from.x[from.layout().shares()].to_vec();
+    let shares = from.x[from.layout().creep_weights()].to_vec();
     trial.restructure(|trial| trial.times = times.to_vec());
-    let slots = trial.layout().shares();
+    let slots = trial.layout().creep_weights();
     trial.x[slots].copy_from_slice(&shares);
     trial.settle_rigid(FEW_STEPS)?;
     Some(trial)

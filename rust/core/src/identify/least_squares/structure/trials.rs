@@ -1,6 +1,6 @@
 //! Trials that do not depend on each other, on all threads.
 
-use super::fit::Fit;
+use crate::identify::least_squares::solving::fit::Fit;
 use crate::math::on_all_threads;
 
 /// A way to a fit; `None` where it was stopped.
