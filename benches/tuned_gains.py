@@ -18,9 +18,9 @@ import numpy as np
 import piezotrack as pt
 from piezotrack.references import circle
 from piezotrack.xu_li_2010.apparatus import LIMITS, Apparatus
-from piezotrack.xu_li_2010.fig_06_identification import record, search
-from piezotrack.xu_li_2010.references import SHRUNK, fast, shrunk, slow
-from piezotrack.xu_li_2010.table_2 import PUBLISHED
+from piezotrack.xu_li_2010.experiments.fig_06_identification import record, search
+from piezotrack.xu_li_2010.experiments.references import SHRUNK, fast, shrunk, slow
+from piezotrack.xu_li_2010.experiments.table_2 import PUBLISHED
 
 RATES = (50.0, 1000.0, 5000.0)
 JUDGED = (1001, 1002, 1003)
@@ -78,7 +78,7 @@ def figures(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> Non
         for rate in rates:
             started = time.perf_counter()
             extra = ("notch",) if rate > 400.0 else ()
-            loop, _ = tuned(
+            loop = tuned(
                 apparatus.x,
                 forward,
                 reference,
@@ -87,7 +87,7 @@ def figures(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> Non
                 limits=limits,
                 parts=(*sought, *extra),
                 search=budget(rate),
-            )
+            ).controller
             took = time.perf_counter() - started
             found = largest(apparatus, loop, reference)
             one, other = (
@@ -107,7 +107,7 @@ def circles(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> Non
         for rate in rates:
             started = time.perf_counter()
             parts = ("pid", "low-pass", "notch") if rate > 400.0 else ("pid", "low-pass")
-            pair, _ = tuned(
+            pair = tuned(
                 apparatus.stage,
                 inverse,
                 path,
@@ -115,7 +115,7 @@ def circles(apparatus: Apparatus, inverse: Any, rates: tuple[float, ...]) -> Non
                 apparatus.delay,
                 parts=parts,
                 search=budget(rate),
-            )
+            ).controllers
             took = time.perf_counter() - started
             after = contour_error(apparatus, pair, path)
             cells = " | ".join(

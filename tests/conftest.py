@@ -32,7 +32,7 @@ def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     modules = [
         import_module(f"piezotrack.{name}")
         for name in (
-            "_support.files",
+            "_support.files.writing",
             "identification.comparison.compare",
             "identification.experiments.sensor_noise",
             "identification.experiments.step_response",

@@ -12,7 +12,7 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 import piezotrack as pt
-from piezotrack.xu_li_2010.procedure import SEARCH_BOX
+from piezotrack.xu_li_2010.experiments.procedure import SEARCH_BOX
 
 if TYPE_CHECKING:
     from collections.abc import Callable

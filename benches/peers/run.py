@@ -137,13 +137,13 @@ def identify(problem: Problem, own: Own, seed: int, threads: int) -> tuple[Row, 
         **arguments,
     )
     seconds = time.perf_counter() - began
-    simulations = fit.nfev + fit.npolish
+    simulations = fit.nfev + fit.search.npolish
     course.append((seconds, simulations, fit.cost_um))
     row = {
         "seed": seed,
         "seconds": seconds,
         "simulations": simulations,
-        "diverged": fit.nfail,
+        "diverged": fit.search.nfail,
         "cost": fit.cost_um,
         "course": course,
     }

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import piezotrack as pt
-from piezotrack.xu_li_2010.procedure import SEARCH_BOX
+from piezotrack.xu_li_2010.experiments.procedure import SEARCH_BOX
 
 if TYPE_CHECKING:
     from collections.abc import Callable

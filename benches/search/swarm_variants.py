@@ -15,7 +15,7 @@ from problems import paper as paper_log
 from problems import plays, swelling
 
 import piezotrack as pt
-from piezotrack.xu_li_2010.procedure import SEARCH_BOX
+from piezotrack.xu_li_2010.experiments.procedure import SEARCH_BOX
 
 RUNS = 100
 NEVER = 10**6
@@ -85,7 +85,7 @@ def two_tones() -> pt.Dataset:
 def run_costs(log: pt.Dataset, swarm: pt.ParticleSwarm, **arguments: object) -> np.ndarray:
     """Cost of each run [um]."""
     fit = pt.identify(log, method=replace(swarm, runs=RUNS), **arguments)
-    return 1e6 * np.array([run.cost for run in fit.runs])
+    return 1e6 * np.array([run.cost for run in fit.search.runs])
 
 
 def show(title: str, found: dict[tuple[str, int], np.ndarray]) -> None:

@@ -71,8 +71,9 @@ def main() -> None:
     )
     spent = time.perf_counter() - began
     fit.save("oscillator.json")
+    search = fit.search
     print(
-        f"identified in {spent:.1f} s, {fit.agreeing} of {len(fit.runs)} runs agree, "
+        f"identified in {spent:.1f} s, {search.agreeing_runs} of {len(search.runs)} runs agree, "
         f"{fit.cost_um:.2f} um rms remain"
     )
     print(f"{'parameter':<12}{'true':>10}{'found':>14}{'error':>10}")

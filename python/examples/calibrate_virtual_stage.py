@@ -10,7 +10,7 @@ import sys
 from itertools import zip_longest
 from pathlib import Path
 
-from piezotrack._support.files import write_document
+from piezotrack._support.files.writing import write_document
 from piezotrack.xu_li_2010.calibration import calibrate
 
 file = Path(sys.argv[1] if len(sys.argv) > 1 else "calibration.txt")

@@ -26,7 +26,7 @@ from .control.running.track import track as track
 from .control.timing import Timing as Timing
 from .control.tuning.goal import Goal as Goal
 from .control.tuning.goal import TuningSearch as TuningSearch
-from .control.tuning.linear_systems import to_control as to_control
+from .control.tuning.linear.systems import to_control as to_control
 from .control.tuning.margins import Margins as Margins
 from .control.tuning.margins import Spread as Spread
 from .control.tuning.schedule import schedule as schedule
@@ -65,29 +65,29 @@ from .references.waveforms import sine as sine
 from .references.waveforms import staircase as staircase
 from .references.waveforms import triangle as triangle
 from .references.xy_reference import XYReference as XYReference
-from .stages.asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
-from .stages.asymmetric_prandtl_ishlinskii import (
+from .stages.feedback.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
+from .stages.feedback.dahl import DahlStage as DahlStage
+from .stages.feedback.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
+from .stages.feedback.lugre import LuGreStage as LuGreStage
+from .stages.feedback.parallel_dahl import ParallelDahlStage as ParallelDahlStage
+from .stages.input.asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
+from .stages.input.bouc_wen import BoucWenStage as BoucWenStage
+from .stages.inverse import Inverse as Inverse
+from .stages.plays.asymmetric_prandtl_ishlinskii import (
     AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
 )
-from .stages.bouc_wen import BoucWenStage as BoucWenStage
-from .stages.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
-from .stages.dahl import DahlStage as DahlStage
-from .stages.duhem import DuhemStage as DuhemStage
-from .stages.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
-from .stages.generalised_prandtl_ishlinskii import (
+from .stages.plays.generalised_prandtl_ishlinskii import (
     GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
 )
-from .stages.inverse import Inverse as Inverse
-from .stages.lugre import LuGreStage as LuGreStage
-from .stages.maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
-from .stages.parallel_dahl import ParallelDahlStage as ParallelDahlStage
-from .stages.polynomial_prandtl_ishlinskii import (
+from .stages.plays.maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
+from .stages.plays.polynomial_prandtl_ishlinskii import (
     PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
 )
-from .stages.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
-from .stages.preisach import PreisachStage as PreisachStage
-from .stages.rate_dependent_prandtl_ishlinskii import (
+from .stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
+from .stages.plays.rate_dependent_prandtl_ishlinskii import (
     RateDependentPrandtlIshlinskiiStage as RateDependentPrandtlIshlinskiiStage,
 )
+from .stages.relays.duhem import DuhemStage as DuhemStage
+from .stages.relays.preisach import PreisachStage as PreisachStage
 from .stages.virtual import VirtualStage as VirtualStage
 from .stages.xy import XYStage as XYStage

@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 
 import piezotrack as pt
 from campaigns import QUICK
-from piezotrack._support import plot_style
-from piezotrack._support.plot_style import folded, legend_inside, plain_log_ticks
+from piezotrack._support.display import plot_style
+from piezotrack._support.display.plot_style import folded, legend_inside, plain_log_ticks
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

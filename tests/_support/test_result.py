@@ -7,7 +7,7 @@ import pkgutil
 from importlib import import_module
 
 import piezotrack as pt
-from piezotrack._support.result import Result, Viewed
+from piezotrack._support.display.result import Result, Viewed
 
 
 def classes() -> list[type[Viewed]]:

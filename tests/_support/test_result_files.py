@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 import piezotrack as pt
-from piezotrack._support import result_files
-from piezotrack._support.files import make_folder, replacing, result_set, write_document
-from piezotrack._support.result_files import MARKER
-from piezotrack._support.temporary import this_host
+from piezotrack._support.files import sets
+from piezotrack._support.files.sets import MARKER
+from piezotrack._support.files.temporary import this_host
+from piezotrack._support.files.writing import make_folder, replacing, result_set, write_document
 
 NAMES = ["a.csv", "b.json", "c.png", "d.svg"]
 POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows cannot tell whether a process runs")
@@ -225,7 +225,7 @@ MARKERS = [
 def test_a_marker_that_is_no_marker_is_removed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str
 ) -> None:
-    monkeypatch.setattr(result_files, "PATIENCE", 0.05)
+    monkeypatch.setattr(sets, "PATIENCE", 0.05)
     (tmp_path / MARKER).write_text(text)
     save(tmp_path, "new")
     assert content(tmp_path) == dict.fromkeys(NAMES, "new")
@@ -275,13 +275,13 @@ def test_a_folder_without_a_name_is_refused() -> None:
 def test_an_interruption_while_the_marker_is_set_leaves_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write = result_files._write
+    write = sets._write
 
     def interrupted(*args: Any, **kwargs: Any) -> None:
         write(*args, **kwargs)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(result_files, "_write", interrupted)
+    monkeypatch.setattr(sets, "_write", interrupted)
     with pytest.raises(KeyboardInterrupt):
         save(tmp_path, "new")
     assert list(tmp_path.iterdir()) == []

@@ -13,8 +13,8 @@ from threading import Barrier, Thread
 import pytest
 
 from folders import ROOT
-from piezotrack._support import temporary
-from piezotrack._support.files import replacing, write_document
+from piezotrack._support.files import temporary
+from piezotrack._support.files.writing import replacing, write_document
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows has neither umask nor kill")
 

@@ -147,7 +147,7 @@ def _no_pictures_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
         plt.close("all")
         return []
 
-    monkeypatch.setattr("piezotrack._support.files.save_figures", none)
+    monkeypatch.setattr("piezotrack._support.files.writing.save_figures", none)
 
 
 def rest_log(name: str = "rest.csv") -> None:

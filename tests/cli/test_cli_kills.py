@@ -14,9 +14,9 @@ import pytest
 
 import piezotrack as pt
 from commands import HEADING, log_text, write_model
-from piezotrack._support.files import write_document
-from piezotrack._support.result_files import MARKER
-from piezotrack._support.temporary import is_temporary
+from piezotrack._support.files.sets import MARKER
+from piezotrack._support.files.temporary import is_temporary
+from piezotrack._support.files.writing import write_document
 
 pytestmark = pytest.mark.skipif(
     os.name == "nt", reason="Windows cannot tell whether a process runs"

@@ -27,7 +27,7 @@ from commands import (
     write,
     write_model,
 )
-from piezotrack._support import progress_bar
+from piezotrack._support.display import progress_bar
 from piezotrack.identification import LeastSquares
 
 

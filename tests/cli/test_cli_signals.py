@@ -65,15 +65,15 @@ def test_a_signal_while_modules_are_imported_is_one_line(
 SLOWLY = """
 import pathlib, time
 from piezotrack.cli import main
-from piezotrack._support import result_files
-rename, replace = result_files._rename, pathlib.Path.replace
+from piezotrack._support.files import sets
+rename, replace = sets._rename, pathlib.Path.replace
 def slowly(path, target):
     time.sleep(0.05)
     return replace(path, target)
 def begun(*all):
     print("begun", flush=True)
     rename(*all)
-pathlib.Path.replace, result_files._rename = slowly, begun
+pathlib.Path.replace, sets._rename = slowly, begun
 main()
 """
 

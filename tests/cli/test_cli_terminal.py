@@ -145,7 +145,7 @@ def test_names_are_printed_in_one_line() -> None:
 def test_a_progress_bar_still_steers_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     from io import StringIO
 
-    from piezotrack._support.progress_bar import console
+    from piezotrack._support.display.progress_bar import console
 
     screen = StringIO()
     monkeypatch.setattr(sys, "stderr", PlainStream(screen))

@@ -13,7 +13,7 @@ import pytest
 
 import piezotrack as pt
 from loops import DT, PID, fitted, loop
-from piezotrack.xu_li_2010.table_2 import PUBLISHED
+from piezotrack.xu_li_2010.experiments.table_2 import PUBLISHED
 from virtual import changed
 
 if TYPE_CHECKING:

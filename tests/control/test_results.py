@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,6 +78,61 @@ def test_a_report_has_its_margins_as_numbers_for_the_file_of_its_controller() ->
     assert design["middle"]["gain_margin"] == report.middle.gain_margin
     assert plain(loop.document(report=report))["provenance"]["design"] == design
     assert plain(loop.document())["provenance"]["design"] is None
+
+
+QUICK = pt.TuningSearch(particles=12, iterations=6)
+
+
+def test_tuned_controllers_are_written_with_their_margins(tmp_path: Path) -> None:
+    path = pt.circle(frequency=0.5, radius=10e-6)
+    xy = pt.XYStage.xu_li_2010(seed=1)
+    of_loop: Any = {"dt": 0.02, "limits": (0.0, 75.0)}
+    tuned = pt.tune(xy, path, parts="pid", search=QUICK, feedforward=(None, None), **of_loop)
+    names = [file.name for file in tuned.save(tmp_path)]
+    assert names[:3] == ["tuning.json", "controller_x.json", "controller_y.json"]
+    assert names[3:] == ["tuned.png", "tuned.svg"]
+    for name, axis in zip(names[1:3], tuned.controllers, strict=True):
+        again = pt.load_controller(tmp_path / name)
+        assert again == axis
+        assert again.provenance is not None
+        assert again.provenance["design"] == plain(tuned.design())
+    document = plain(tuned.document())
+    assert [one["feedback"]["kp"] for one in document["axes"]] == [
+        one.feedback._pid.kp for one in tuned.controllers if one.feedback
+    ]
+    other = replace(tuned.controller, dt=0.01)
+    with pytest.raises(pt.ParameterError, match="of another controller"):
+        other.document(report=tuned)
+    (ax,) = tuned.plot(fig=Figure()).axes
+    (line,) = ax.lines
+    figures = np.asarray(line.get_ydata(), float)
+    assert figures[-1] == 1e6 * tuned.history[-1] < figures[0]
+
+
+def test_a_tuning_without_references_is_drawn_in_the_unit_of_its_value() -> None:
+    tuned = pt.tune(PLAYS, dt=1e-3, limits=(0.0, 75.0), parts="pid", search=QUICK)
+    (ax,) = tuned.plot(fig=Figure()).axes
+    assert "m s/V" in ax.get_ylabel()
+    assert np.asarray(ax.lines[0].get_ydata(), float)[-1] == pytest.approx(tuned.value, rel=1e-12)
+
+
+def test_a_schedule_is_its_grid(tmp_path: Path) -> None:
+    grid: tuple[Any, Any] = ([5e-6, 20e-6], [0.5, 1.0, 2.0])
+    options: Any = {"dt": 0.01, "limits": (0.0, 75.0), "parts": "pid", "search": QUICK}
+    found = pt.schedule(PLAYS, *grid, centre=40e-6, **options)
+    table = found.table
+    law: Any = found.controller.feedback
+    assert table["kp_V_per_m"].tolist() == [one.kp for one in law.gains]
+    places = zip(table["amplitude_m"], table["rate_Hz"], strict=True)
+    assert list(places) == [(amplitude, rate) for amplitude in grid[0] for rate in grid[1]]
+    assert found.errors[1, 2, 1] == table["scheduled_rms_m"][5]
+    assert found.to_frame()["ti_s"].tolist() == [one.ti for one in law.gains]
+    files = {file.name: file for file in found.save(tmp_path)}
+    assert set(files) == {"schedule.csv", "schedule.json", "schedule.png", "schedule.svg"}
+    assert json.loads(files["schedule.json"].read_text()) == plain(found.document())
+    (ax,) = found.plot(fig=Figure()).axes
+    drawn = np.array([line.get_ydata() for line in ax.lines], float)
+    np.testing.assert_allclose(drawn, 1e6 * np.moveaxis(found.errors, 2, 1).reshape(4, 3))
 
 
 def test_panels_are_drawn_in_the_axes_given() -> None:

@@ -67,7 +67,7 @@ def test_the_table_is_that_of_the_runs() -> None:
     table = found().errors
     assert table.shape == (2, 2, 2)
     assert (table[..., 1] <= table[..., 0]).all()
-    runs = found().fixed.report.runs
+    runs = found().fixed.runs
     assert table[..., 0].ravel() == pytest.approx([one.metrics.rms_error for one in runs])
     # At a place of the grid, the controller is that of the gains found there.
     one = replace(found().controller, feedback=replace(law(), first=(AMPLITUDES[0], RATES[1])))

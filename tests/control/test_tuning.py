@@ -37,14 +37,14 @@ def motion(duration: float = 15.0) -> pt.Reference:
 
 def test_tuned_gains_beat_the_published_ones_with_more_margin() -> None:
     stage, reference = published_stage(), motion()
-    tuned, report = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts="pid", **QUICK)
+    tuned = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts="pid", **QUICK)
     published = pt.Controller(dt=0.02, limits=LIMITS, feedback=pt.Pid.xu_li_2010())
     for seed in (11, 12):
         other = pt.VirtualStage.xu_li_2010(seed=seed)
         before = pt.track(other, published, reference).metrics
-        after = pt.track(other, tuned, reference).metrics
+        after = pt.track(other, tuned.controller, reference).metrics
         assert after.rms_error < 0.8 * before.rms_error
-    loops = pt.check_loop(stage, tuned)
+    loops = pt.check_loop(stage, tuned.controller)
     for one in (loops.low, loops.middle, loops.high):
         assert one.stable
         assert one.sensitivity <= 2.0 * 1.01
@@ -54,63 +54,61 @@ def test_tuned_gains_beat_the_published_ones_with_more_margin() -> None:
     assert before_margin is not None
     assert before_margin < 2.0
     # Either a margin or a setting is at its bound, or the figure has its minimum inside.
-    assert report.active_constraints
-    assert all(one.share <= 1.01 for one in report.kept)
+    assert tuned.active_constraints
+    assert all(one.share <= 1.01 for one in tuned.kept)
 
 
 def test_the_report_is_that_of_the_exact_check_and_of_a_full_simulation() -> None:
     stage, reference = published_stage(), motion()
-    tuned, report = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts="pid", **QUICK)
-    again = pt.track(stage, tuned, reference)
-    assert report.runs[0].metrics == again.metrics
+    tuned = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts="pid", **QUICK)
+    again = pt.track(stage, tuned.controller, reference)
+    assert tuned.runs[0].metrics == again.metrics
     # The loops of the search take longer steps.
-    assert report.value == pytest.approx(again.metrics.rms_error, rel=0.02)
-    worst = max(
-        one.sensitivity
-        for one in (pt.check_loop(stage, tuned).low, pt.check_loop(stage, tuned).high)
-    )
-    kept = {one.name: one for one in report.kept}
+    assert tuned.value == pytest.approx(again.metrics.rms_error, rel=0.02)
+    loops = pt.check_loop(stage, tuned.controller)
+    worst = max(one.sensitivity for one in (loops.low, loops.high))
+    kept = {one.name: one for one in tuned.kept}
     assert kept["sensitivity"].value == pytest.approx(worst)
-    assert "active constraints" in str(report)
+    assert "active constraints" in str(tuned)
 
 
 @pytest.mark.slow
 def test_a_spread_is_kept_at_its_ends() -> None:
     stage = published_stage()
     spread = pt.Spread(delay=(0.0, 1e-3), mode=0.1, gain=0.2)
-    tuned, report = pt.tune(stage, dt=2e-3, limits=LIMITS, spread=spread, **QUICK)
-    assert len(report.plants) == 3 * 2 * 3 * 3
-    late = pt.check_loop(stage, tuned, delay=1e-3)
+    tuned = pt.tune(stage, dt=2e-3, limits=LIMITS, spread=spread, **QUICK)
+    assert len(tuned.plants) == 3 * 2 * 3 * 3
+    late = pt.check_loop(stage, tuned.controller, delay=1e-3)
     assert late.high.stable
     gain = late.high.gain_margin
     assert gain is not None
     # 20 % more gain still has a margin of 2.
     assert gain / 1.2 >= 2.0 * 0.99
-    alone, _ = pt.tune(stage, dt=2e-3, limits=LIMITS, **QUICK)
+    alone = pt.tune(stage, dt=2e-3, limits=LIMITS, **QUICK).controller
     assert isinstance(alone.feedback, pt.Pid)
-    assert isinstance(tuned.feedback, pt.Pid)
+    law = tuned.controller.feedback
+    assert isinstance(law, pt.Pid)
     # What is kept for more plants costs integral gain.
-    assert tuned.feedback.kp / tuned.feedback.ti < alone.feedback.kp / alone.feedback.ti
+    assert law.kp / law.ti < alone.feedback.kp / alone.feedback.ti
 
 
 def test_a_repetitive_part_is_tuned_where_the_reference_repeats() -> None:
     stage = published_stage()
     reference = pt.sine(frequency=0.5, low=0.0, high=100e-6, duration=14.0)
-    tuned, report = pt.tune(stage, reference, dt=0.02, limits=LIMITS, **QUICK)
-    assert tuned.repetitive is not None
-    assert tuned.repetitive.period == 2.0
-    plain, _ = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts=("pid", "low-pass"), **QUICK)
-    learnt = pt.track(stage, tuned, reference).score(8.0).rms_error
+    tuned = pt.tune(stage, reference, dt=0.02, limits=LIMITS, **QUICK)
+    assert tuned.controller.repetitive is not None
+    assert tuned.controller.repetitive.period == 2.0
+    parts = ("pid", "low-pass")
+    plain = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts=parts, **QUICK).controller
+    learnt = pt.track(stage, tuned.controller, reference).score(8.0).rms_error
     assert learnt < 0.95 * pt.track(stage, plain, reference).score(8.0).rms_error
-    assert {one.name for one in report.kept} >= {"learning"}
+    assert {one.name for one in tuned.kept} >= {"learning"}
 
 
 def test_the_fastest_of_the_allowed_sampling_rates_wins_on_a_clean_stage() -> None:
     stage = replace(published_stage(), sensor=pt.stages.Sensor())
-    tuned, report = pt.tune(
-        stage, motion(10.0), dt=(0.02, 0.005), limits=LIMITS, parts="pid", **QUICK
-    )
-    assert tuned.dt == report.dt == 0.005
+    tuned = pt.tune(stage, motion(10.0), dt=(0.02, 0.005), limits=LIMITS, parts="pid", **QUICK)
+    assert tuned.controller.dt == 0.005
 
 
 def test_the_same_bits_for_any_number_of_threads() -> None:
@@ -125,8 +123,8 @@ def test_the_same_bits_for_any_number_of_threads() -> None:
 def test_less_effort_where_it_costs() -> None:
     stage, reference = published_stage(), motion()
     at: dict[str, Any] = {"dt": 5e-3, "limits": LIMITS, "parts": ("pid", "low-pass"), **QUICK}
-    free = pt.tune(stage, reference, **at).report.runs[0]
-    calm = pt.tune(stage, reference, goal=pt.Goal(effort=5e-6), **at).report.runs[0]
+    free = pt.tune(stage, reference, **at).runs[0]
+    calm = pt.tune(stage, reference, goal=pt.Goal(effort=5e-6), **at).runs[0]
     changes = [np.diff(run.voltage[run.t > run.settled]).std() for run in (free, calm)]
     assert changes[1] < changes[0]
 
@@ -135,11 +133,11 @@ def test_gains_of_a_stage_that_falls_as_the_voltage_rises_are_negative() -> None
     stage = pt.stages.PrandtlIshlinskiiStage(
         linear=-1e-6, thresholds=(10.0,), weights=(-0.2e-6,), frequency=300.0, damping_ratio=0.1
     )
-    tuned, report = pt.tune(stage, dt=1e-3, limits=LIMITS, parts="pid", **QUICK)
-    assert isinstance(tuned.feedback, pt.Pid)
-    assert tuned.feedback.kp < 0.0
-    assert pt.check_loop(stage, tuned).stable
-    assert max(one.share for one in report.kept) <= 1.01
+    tuned = pt.tune(stage, dt=1e-3, limits=LIMITS, parts="pid", **QUICK)
+    assert isinstance(tuned.controller.feedback, pt.Pid)
+    assert tuned.controller.feedback.kp < 0.0
+    assert pt.check_loop(stage, tuned.controller).stable
+    assert max(one.share for one in tuned.kept) <= 1.01
 
 
 def test_shares_of_what_was_asked_for() -> None:
@@ -285,7 +283,7 @@ def test_the_least_effort_within_an_allowed_error() -> None:
     stage = published_stage()
     reference = pt.sine(frequency=0.1, low=0.0, high=10e-6, duration=20.0)
     best = pt.tune(stage, reference, dt=0.02, limits=LIMITS, parts="pid", **QUICK)
-    largest = 1.5 * best.report.value
+    largest = 1.5 * best.value
     calm = pt.tune(
         stage,
         reference,
@@ -295,16 +293,16 @@ def test_the_least_effort_within_an_allowed_error() -> None:
         goal=pt.Goal(minimise="effort", largest_error=largest),
         **QUICK,
     )
-    (run,), (before,) = calm.report.runs, best.report.runs
+    (run,), (before,) = calm.runs, best.runs
 
     def effort(of: Tracking) -> float:
         return float(np.sqrt(np.mean(np.diff(of.voltage) ** 2)))
 
     assert run.metrics.rms_error <= 1.02 * largest
     assert effort(run) < 0.95 * effort(before)
-    assert calm.report.unit == "V"
-    assert calm.report.value == pytest.approx(effort(run), rel=0.1)
-    assert "largest_error" in calm.report.active_constraints
+    assert calm.unit == "V"
+    assert calm.value == pytest.approx(effort(run), rel=0.1)
+    assert "largest_error" in calm.active_constraints
 
 
 def test_an_error_that_is_not_reached_is_refused_with_the_least() -> None:
@@ -339,7 +337,7 @@ def test_a_jitter_of_the_loop_costs_error() -> None:
     options: dict[str, Any] = {"dt": 0.02, "limits": LIMITS, "parts": "pid", **QUICK}
     stage = published_stage()
     clean, late = (
-        pt.tune(stage, reference, timing=pt.Timing(jitter=jitter), **options).report.value
+        pt.tune(stage, reference, timing=pt.Timing(jitter=jitter), **options).value
         for jitter in (0.0, 5e-3)
     )
     assert late > clean

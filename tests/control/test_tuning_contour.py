@@ -58,7 +58,8 @@ def test_the_contour_error_of_the_search_is_that_of_a_full_simulation(
 def test_two_controllers_beat_the_published_gains_where_one_axis_comes_late() -> None:
     # 10 ms between the axes: no gains of one axis by itself mend that, those of both do.
     path = pt.circle(frequency=0.5, radius=20e-6)
-    (x, y), report = pt.tune(pt.XYStage.xu_li_2010(seed=1), path, parts="pid", **QUICK)
+    tuned = pt.tune(pt.XYStage.xu_li_2010(seed=1), path, parts="pid", **QUICK)
+    x, y = tuned.controllers
     alone = tuple(
         pt.tune(axis, reference, parts="pid", **QUICK).controller
         for axis, reference in zip(
@@ -73,20 +74,20 @@ def test_two_controllers_beat_the_published_gains_where_one_axis_comes_late() ->
     after = pt.contour(other, (x, y), path).metrics
     assert after.rms_error < 0.8 * before.rms_error
     assert after.rms_error < 0.95 * apart.rms_error
-    assert report.minimised == "rms contour error"
+    assert tuned.minimised == "rms contour error"
     # The gains are the best for one draw of the noise; the full simulation reads another.
-    assert report.value == pytest.approx(report.runs[0].metrics.rms_error, rel=0.15)
+    assert tuned.value == pytest.approx(tuned.runs[0].metrics.rms_error, rel=0.15)
     for axis, loop in ((other.x, x), (other.y, y)):
         assert pt.check_loop(axis, loop).high.sensitivity <= 2.0 * 1.01
-    assert any(name.startswith("y, ") for name in report.plants)
-    assert "contour error" in str(report)
+    assert any(name.startswith("y, ") for name in tuned.plants)
+    assert "contour error" in str(tuned)
 
 
 def test_each_axis_gets_the_feedforward_of_its_own() -> None:
     stage = pt.XYStage.xu_li_2010(seed=1)
     inverse = pt.DahlStage.xu_li_2010().inverse()
     path = pt.circle(frequency=0.5, radius=10e-6)
-    (x, y), _ = pt.tune(stage, path, feedforward=(inverse, None), parts="pid", **QUICK)
+    x, y = pt.tune(stage, path, feedforward=(inverse, None), parts="pid", **QUICK).controllers
     assert x.feedforward is inverse
     assert y.feedforward is None
 
@@ -123,13 +124,13 @@ def test_the_same_bits_for_any_number_of_threads() -> None:
         for threads in (1, 3)
     )
     assert one.controllers == three.controllers
-    assert np.array_equal(one.report.history, three.report.history)
+    assert np.array_equal(one.history, three.history)
 
 
 def test_scheduled_gains_of_both_axes_follow_the_contour() -> None:
     stage, grid = pt.XYStage.xu_li_2010(seed=1), ([10e-6, 40e-6], [0.5])
     found = pt.schedule(stage, *grid, **LOOP, search=pt.TuningSearch(particles=16, iterations=12))
-    assert isinstance(found, pt.control.SchedulePair)
+    assert len(found.controllers) == 2
     assert found.errors.shape == (2, 1, 2)
     assert (found.errors[..., 1] <= found.errors[..., 0]).all()
     for radius, (fixed, after) in zip(grid[0], found.errors[:, 0], strict=True):
@@ -148,7 +149,8 @@ def test_filters_of_each_axis() -> None:
     path = pt.circle(frequency=0.5, radius=10e-6)
     filters: Any = ([pt.LowPass(10.0)], [pt.LowPass(4.0)])
     options = {**LOOP, "search": pt.TuningSearch(particles=10, iterations=4)}
-    (x, y), _ = pt.tune(pt.XYStage.xu_li_2010(), path, parts="pid", filters=filters, **options)
+    tuned = pt.tune(pt.XYStage.xu_li_2010(), path, parts="pid", filters=filters, **options)
+    x, y = tuned.controllers
     assert x.filters == (pt.LowPass(10.0),)
     assert y.filters == (pt.LowPass(4.0),)
 
@@ -159,7 +161,7 @@ def test_the_runs_of_the_report_begin_after_the_voltages_before() -> None:
     timing = pt.Timing(voltages_before=(75.0, 30.0))
     search = pt.TuningSearch(particles=10, iterations=2)
     tuned = pt.tune(stage, path, parts="pid", timing=timing, search=search, **LOOP)
-    (run,) = tuned.report.runs
+    (run,) = tuned.runs
     assert run.x.displacement[0] == pytest.approx(
         pt.DahlStage.xu_li_2010().equilibrium([75.0, 30.0]).x, rel=1e-9
     )

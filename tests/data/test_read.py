@@ -390,7 +390,7 @@ def test_a_clean_log_is_not_read_line_by_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: str
 ) -> None:
     # Ten times slower, and a million samples are nothing unusual.
-    monkeypatch.delattr("piezotrack.data.formats.text.TextTable._table_by_line")
+    monkeypatch.delattr("piezotrack.data.formats.text.delimited.TextTable._table_by_line")
     assert is_the_log(pt.read(write(tmp_path, content)))
 
 

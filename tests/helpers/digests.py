@@ -43,7 +43,7 @@ def digests(threads: int) -> list[str]:
 
 
 def digest(fit: Any) -> str:
-    content = repr((fit.document(), fit.history.tobytes()))
+    content = repr((fit.document(), fit.search.history.tobytes()))
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 

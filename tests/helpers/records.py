@@ -145,8 +145,21 @@ def quick_fit(
     )
 
 
+def search_of(fit: pt.identification.Identification) -> pt.identification.SearchRun:
+    """The course of the search, which there has to be."""
+    assert fit.search is not None
+    return fit.search
+
+
+def selection_of(fit: pt.identification.Identification) -> pt.identification.Selection:
+    """The choice between models, which there has to be."""
+    assert fit.selection is not None
+    return fit.selection
+
+
 def bits(fit: pt.identification.Identification) -> dict[str, Any]:
     """All numbers of a result, down to the last bit."""
+    search = search_of(fit)
     return {
         "model": [
             one.hex()
@@ -155,9 +168,16 @@ def bits(fit: pt.identification.Identification) -> dict[str, Any]:
         ],
         "cost": fit.cost.hex(),
         "offset": fit.offset.hex(),
-        "history": fit.history.tobytes(),
+        "history": search.history.tobytes(),
         "parameters": repr(dict(fit.parameters)),
-        "counts": (fit.nit, fit.nfev, fit.nfail, fit.npolish, fit.substeps, fit.stop_reason),
+        "counts": (
+            search.nit,
+            fit.nfev,
+            search.nfail,
+            search.npolish,
+            search.substeps,
+            fit.stop_reason,
+        ),
     }
 
 

@@ -233,7 +233,7 @@ except pt.Interrupted as error:
 def test_a_result_that_cannot_be_written_says_how_far_it_came(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from piezotrack._support.files import write_document
+    from piezotrack._support.files.writing import write_document
 
     left = iter(range(3))
 

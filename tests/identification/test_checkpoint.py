@@ -18,6 +18,7 @@ import pytest
 import piezotrack as pt
 from commands import ran, refusal
 from piezotrack.data.log_file import write_log
+from records import search_of
 
 DT = 1e-3
 
@@ -32,7 +33,8 @@ def record(seed: int = 0, count: int = 2000) -> pt.Dataset:
 
 def found(fit: pt.identification.Identification) -> Any:
     """All that a search says."""
-    return fit.document(), fit.history.tolist(), fit.runs, fit.nfev, fit.npolish
+    search = search_of(fit)
+    return fit.document(), search.history.tolist(), search.runs, fit.nfev, search.npolish
 
 
 def interrupted(path: Path, after: int, log: pt.Dataset | None = None, **settings: Any) -> bool:
@@ -102,7 +104,7 @@ SEARCH = """
     print("begun", flush=True)
     log, swarm = pt.Dataset(u=u, y=y, dt=1e-3), pt.ParticleSwarm(runs=3)
     fit = pt.identify(log, "bouc-wen", method=swarm, checkpoint=sys.argv[2])
-    print(repr((fit.cost, fit.parameters, fit.nfev, fit.history.tolist())))
+    print(repr((fit.cost, fit.parameters, fit.nfev, fit.search.history.tolist())))
 """
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack._support.files import save_figures
+from piezotrack._support.files.writing import save_figures
 from piezotrack.identification.views.plot import plot_loop
 from records import published, quick
 

@@ -21,6 +21,7 @@ from records import (
     noisy,
     quick,
     quick_fit,
+    search_of,
     slow_sine,
 )
 
@@ -68,7 +69,7 @@ def test_the_papers_search_finds_what_scipy_simulated(drive: str, seed: int) -> 
         method=pt.ParticleSwarm.xu_li_2010(seed=seed),
     )
     assert max(off(fit).values()) < 0.01, off(fit)
-    assert fit.cost == min(run.cost for run in fit.runs)
+    assert fit.cost == min(run.cost for run in search_of(fit).runs)
     assert fit.cost < 1.3 * NOISE
 
 
@@ -78,14 +79,14 @@ def test_the_papers_search_finds_what_scipy_simulated(drive: str, seed: int) -> 
 def test_spso_2011_finds_it_and_the_descent_sharpens_it(update: Any, seed: int) -> None:
     swarm = replace(pt.ParticleSwarm.spso_2011(), update=update)
     plain = quick_fit(offset=False, swarm=swarm, seed=seed)
-    assert plain.npolish == 0
+    assert search_of(plain).npolish == 0
     assert plain.cost < 1.35 * NOISE
     assert max(off(plain).values()) < 0.02, off(plain)
     polished = quick_fit(offset=False, swarm=replace(swarm, polish=True), seed=seed)
     assert polished.cost == pytest.approx(NOISE, rel=0.05)
     assert max(off(polished).values()) < 0.002, off(polished)
     # The four runs end in one place.
-    assert polished.agreeing == 4
+    assert search_of(polished).agreeing_runs == 4
 
 
 @pytest.mark.parametrize("drive", ["slow sine", "two tones"])
@@ -260,7 +261,7 @@ def test_same_seed_same_bits_for_any_number_of_threads(name: str, runs: int) -> 
     for threads in (2, 7, None):
         assert bits(quick_fit(swarm=SWARMS[name], threads=threads, runs=runs)) == bits(one)
     other = quick_fit(swarm=SWARMS[name], seed=2, runs=runs)
-    assert other.history.tobytes() != one.history.tobytes()
+    assert search_of(other).history.tobytes() != search_of(one).history.tobytes()
 
 
 def test_same_seed_same_bits_where_everything_is_free() -> None:
@@ -273,9 +274,10 @@ def test_same_seed_same_bits_where_everything_is_free() -> None:
 
 def test_a_run_does_not_depend_on_the_others() -> None:
     alone, several = quick_fit(), quick_fit(runs=4)
-    assert several.runs[0] == alone.runs[0]
-    assert len({run.cost for run in several.runs}) > 1
-    assert several.cost == min(run.cost for run in several.runs)
+    runs = search_of(several).runs
+    assert runs[0] == search_of(alone).runs[0]
+    assert len({run.cost for run in runs}) > 1
+    assert several.cost == min(run.cost for run in runs)
 
 
 def test_searches_on_two_threads_of_python_do_not_meet() -> None:
@@ -293,7 +295,7 @@ def test_a_result_has_scipys_names() -> None:
     assert fit.fun == fit.cost
     assert fit.cost_um == pytest.approx(1e6 * fit.cost)
     assert fit.cost_percent == pytest.approx(100.0 * fit.cost / fit.data.stroke)
-    assert fit.nit == 30
+    assert search_of(fit).nit == 30
     assert fit.nfev == 4 * 12 * 31  # of all runs
     assert fit.success is True
     assert fit.stop_reason == "iterations"
@@ -304,19 +306,20 @@ def test_a_result_has_scipys_names() -> None:
 def test_the_history_falls_and_ends_in_the_cost() -> None:
     plain = replace(pt.ParticleSwarm(), particles=12, iterations=30, polish=False)
     fit = quick_fit(swarm=plain, runs=1)
-    assert fit.history.shape == (fit.nit + 1,)
-    assert (np.diff(fit.history) <= 0.0).all()
-    assert fit.history[-1] == fit.cost
-    assert fit.npolish == 0
+    search = search_of(fit)
+    assert search.history.shape == (search.nit + 1,)
+    assert (np.diff(search.history) <= 0.0).all()
+    assert search.history[-1] == fit.cost
+    assert search.npolish == 0
     polished = quick_fit(runs=1)
-    assert polished.history.tobytes() == fit.history.tobytes()
+    assert search_of(polished).history.tobytes() == search.history.tobytes()
     assert polished.cost < fit.cost
-    assert polished.npolish > 0
+    assert search_of(polished).npolish > 0
 
 
 def test_a_stalled_search_says_so() -> None:
     fit = quick_fit(swarm=pt.ParticleSwarm(stall_iterations=3, min_improvement=10e-6))
-    assert (fit.stop_reason, fit.success, fit.nit) == ("stalled", True, 3)
+    assert (fit.stop_reason, fit.success, search_of(fit).nit) == ("stalled", True, 3)
     assert fit.message == "3 iterations in a row improved the cost by less than 10 um"
 
 
@@ -345,10 +348,10 @@ def test_one_failing_simulation_does_not_end_the_search() -> None:
         },
         method=pt.Descents(seed=1),
     )
-    assert 0 < fit.nfail < fit.nfev
+    assert 0 < search_of(fit).nfail < fit.nfev
     assert fit.cost == pytest.approx(NOISE, rel=0.1)
     assert fit.model.b1 == pytest.approx(TABLE_1.b1, rel=0.05)
-    assert f"{fit.nfail} simulations diverged" in fit.summary()
+    assert f"{search_of(fit).nfail} simulations diverged" in fit.summary()
 
 
 def test_where_every_simulation_fails_the_message_says_what_to_look_at() -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack._support.files import save_figures
+from piezotrack._support.files.writing import save_figures
 from piezotrack.identification.views.plot import (
     plot_convergence,
     plot_loop,
@@ -20,7 +20,7 @@ from piezotrack.identification.views.plot import (
     plot_time,
 )
 from piezotrack.identification.views.report import save_identification
-from records import quick, quick_fit
+from records import quick, quick_fit, search_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -105,7 +105,7 @@ def test_what_is_drawn_is_what_was_measured_and_simulated() -> None:
             assert np.allclose(drawn_x, x, rtol=1e-12)
             assert np.allclose(drawn_y, 1e6 * y, rtol=1e-12)
     assert np.allclose(points(below, 0)[1], 1e9 * (log.y - run.x), rtol=1e-9, atol=1e-9)
-    assert np.allclose(points(convergence, 0)[1], 1e6 * fitted().history, rtol=1e-12)
+    assert np.allclose(points(convergence, 0)[1], 1e6 * search_of(fitted()).history, rtol=1e-12)
     assert f"rms {1e9 * fitted().fitted.rms:.3g} nm" in below.get_title()
     # What ran: model, record, window, error.
     title = fitted().plot().get_suptitle()
@@ -149,7 +149,7 @@ def test_panels_of_a_fit_show_its_record() -> None:
     assert np.allclose(points(fitted().plot_loop(), 1)[1], 1e6 * run.x, rtol=1e-12)
     assert np.allclose(points(fitted().plot_time()[0], 1)[1], 1e6 * run.x, rtol=1e-12)
     drawn = points(fitted().plot_convergence(), 0)[1]
-    assert np.allclose(drawn, 1e6 * fitted().history, rtol=1e-12)
+    assert np.allclose(drawn, 1e6 * search_of(fitted()).history, rtol=1e-12)
 
 
 def test_a_fit_by_least_squares_has_no_convergence() -> None:
@@ -228,7 +228,8 @@ def test_an_exact_fit_can_be_drawn() -> None:
     above, below = plot_time(log, response())
     assert below.get_title().startswith("error = measured - simulated: rms 0 ")
     above.figure.canvas.draw()
-    flat = replace(fitted(), history=np.zeros(31), cost=0.0)
+    search = replace(search_of(fitted()), history=np.zeros(31))
+    flat = replace(fitted(), search=search, cost=0.0)
     plot_convergence(flat).figure.canvas.draw()
 
 

@@ -70,16 +70,16 @@ def test_margins_of_a_tuned_loop_hold_for_all_of_them() -> None:
     fit = pt.identify(log, "prandtl-ishlinskii")
     nearby = posterior_models(fit, log)
     assert len(nearby) >= 6
-    controller, report = pt.tune(
+    tuned = pt.tune(
         [fit, *nearby],
         dt=DT,
         limits=(0.0, 50.0),
         parts="pid",
         search=pt.TuningSearch(particles=16, iterations=10),
     )
-    assert len(report.plants) == 3 * (1 + len(nearby))
-    loops = [pt.check_loop(one, controller) for one in nearby]
-    for loop in (*loops, pt.check_loop(STAGE, controller)):
+    assert len(tuned.plants) == 3 * (1 + len(nearby))
+    loops = [pt.check_loop(one, tuned.controller) for one in nearby]
+    for loop in (*loops, pt.check_loop(STAGE, tuned.controller)):
         assert max(case.sensitivity for case in (loop.low, loop.middle, loop.high)) < 2.0 * 1.02
 
 

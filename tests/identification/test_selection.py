@@ -10,7 +10,8 @@ import pytest
 
 import piezotrack as pt
 from piezotrack._support.statistics import sample_noise
-from piezotrack.identification.fitted.trial import Trial
+from piezotrack.identification.fitted.selection import Trial
+from records import selection_of
 
 DT = 1e-3
 T = DT * np.arange(4000)
@@ -34,32 +35,37 @@ def record(stage: pt.stages.Stage, noise: float) -> pt.Dataset:
     return pt.Dataset(u=U, y=x + noise * np.random.default_rng(0).normal(size=x.size), dt=DT)
 
 
+def tried(fit: pt.identification.Identification) -> list[str]:
+    return [trial.model for trial in selection_of(fit).trials]
+
+
 def test_plays_are_found_without_a_search() -> None:
     fit = pt.identify(record(PLAYS, 1e-8), progress=False)
     assert fit.model.info.name == "prandtl-ishlinskii"
     assert fit.cost < 3e-8
     # As good as the noise: no other kind could be better.
-    assert [trial.model for trial in fit.trials] == ["prandtl-ishlinskii"]
-    assert fit.fitted_until is not None
+    assert tried(fit) == ["prandtl-ishlinskii"]
+    assert selection_of(fit).fitted_until is not None
     assert "chosen by the rms after" in fit.summary()
 
 
 def test_smooth_tips_are_told_from_plays(tmp_path: Path) -> None:
     fit = pt.identify(record(SMOOTH, 1e-9), method=pt.Descents(seed=1, runs=2), progress=False)
     assert fit.model.info.name in ("first-order-dahl", "parallel-dahl")
-    assert fit.trials[0].model == fit.model.info.name
-    assert fit.trials[0].rms < 0.5 * next(
-        trial.rms for trial in fit.trials if trial.model == "prandtl-ishlinskii"
+    trials = selection_of(fit).trials
+    assert trials[0].model == fit.model.info.name
+    assert trials[0].rms < 0.5 * next(
+        trial.rms for trial in trials if trial.model == "prandtl-ishlinskii"
     )
     document = json.loads(fit.save(tmp_path / "model.json").read_text(encoding="utf-8"))
-    assert set(document["selection"]["models"]) == {trial.model for trial in fit.trials}
+    assert document["selection"]["models"].keys() == set(tried(fit))
     assert pt.load(tmp_path / "model.json").model == fit.model
 
 
 def test_a_record_too_short_to_be_parted_says_so() -> None:
     short = record(PLAYS, 1e-8)[:1.5]
     fit = pt.identify(short, progress=False)
-    assert fit.fitted_until is None
+    assert selection_of(fit).fitted_until is None
     assert "too short for another" in fit.summary()
 
 
@@ -72,7 +78,9 @@ def test_the_swing_of_a_mode_does_not_hide_what_is_left() -> None:
     # The motion between samples is no less than the residual, which is far above the noise.
     assert 3e-8 < fit.cost < 3.0 * sample_noise(y)
     trial = Trial("prandtl-ishlinskii", "Prandtl-Ishlinskii", fit.cost)
-    chosen = dataclasses.replace(fit, trials=(trial,))
+    chosen = dataclasses.replace(
+        fit, selection=pt.identification.Selection(trials=(trial,), fitted_until=None)
+    )
     assert any("times the noise between samples" in note for note in chosen.notes)
 
 
@@ -98,5 +106,5 @@ def test_a_kind_that_diverges_on_the_rest_is_left_out(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(pt.identification.IdentifiedModel, "score", diverging)
     fit = pt.identify(log, method=pt.ParticleSwarm(particles=8, iterations=5, seed=1, runs=1))
-    assert names[0] not in {trial.model for trial in fit.trials}
-    assert fit.trials
+    assert names[0] not in tried(fit)
+    assert tried(fit)

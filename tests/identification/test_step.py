@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 import piezotrack as pt
 from folders import SHARED
-from piezotrack._support.files import write_columns
+from piezotrack._support.files.writing import write_columns
 from piezotrack.cli.commands import app
 from records import BOX, TABLE_1, quick
 from virtual import changed

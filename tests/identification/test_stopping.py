@@ -13,11 +13,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from records import (
-    bits,
-    quick,
-    quick_fit,
-)
+from records import bits, quick, quick_fit, search_of
 
 NAMES = ("mass", "damping", "stiffness", "piezo_coefficient", "a1", "a2", "b1", "b0", "up")
 
@@ -29,7 +25,7 @@ def test_the_callback_is_told_of_every_iteration_in_order() -> None:
     assert [progress.nit for progress in seen] == list(range(31))
     assert {progress.iterations for progress in seen} == {30}
     assert [progress.nfev for progress in seen] == [12 * (k + 1) for k in range(31)]
-    assert [progress.cost for progress in seen] == fit.history.tolist()
+    assert [progress.cost for progress in seen] == search_of(fit).history.tolist()
     last: dict[str, Any] = dict(seen[-1].parameters)
     assert tuple(last) == NAMES
     score = pt.identification.IdentifiedModel(
@@ -59,10 +55,10 @@ def test_a_true_answer_stops_with_the_best_so_far() -> None:
     assert len(seen) == 8
     assert partial.cost == seen[-1].cost
     assert partial.model == pt.DahlStage(**cast("dict[str, Any]", seen[-1].parameters))
-    assert (partial.nit, partial.nfev) == (7, 4 * 12 * 8)
+    assert (search_of(partial).nit, partial.nfev) == (7, 4 * 12 * 8)
     assert (partial.success, partial.stop_reason) == (False, "interrupted")
     assert partial.message == "interrupted"
-    assert partial.history.shape == (8,)
+    assert search_of(partial).history.shape == (8,)
     assert partial.score(quick()).rms == pytest.approx(partial.cost, abs=2e-10)
     assert "interrupted" in partial.summary()
 
@@ -75,7 +71,7 @@ def test_stop_iteration_and_ctrl_c_in_a_callback_stop(error: type[BaseException]
 
     with pytest.raises(pt.Interrupted) as caught:
         quick_fit(callback=stop)
-    assert caught.value.partial.nit == 3
+    assert caught.value.partial.search.nit == 3
 
 
 @pytest.mark.parametrize("error", [LookupError("mine"), SystemExit(3), pt.DataError("also mine")])
@@ -125,7 +121,7 @@ try:
 except KeyboardInterrupt as stopped:
     ended = time.monotonic()
     partial = stopped.partial
-    nit = None if partial is None else partial.nit
+    nit = None if partial is None else partial.search.nit
     cost = None if partial is None else partial.cost
     if callback is not None:
         # Ctrl-C may come on the way to the callback, and then the best is newer by one.

@@ -301,7 +301,7 @@ def test_online_the_delay_leads_too() -> None:
 
 SINE = REFERENCES["sine"]()
 BAD: dict[str, tuple[Callable[[], Any], str]] = {
-    "stage": (lambda: pt.Inverse(stage=5), "stage is 5"),
+    "stage": (lambda: pt.Inverse(stage=5), "stage is 5"),  # type: ignore[arg-type]
     "offset": (lambda: pt.Inverse(stage=TABLE_1, offset=math.nan), "offset is nan"),
     "delay": (lambda: pt.Inverse(stage=TABLE_1, delay=-1e-3), "delay is -0.001"),
     "playback": (
@@ -343,7 +343,7 @@ def test_refuses(name: str) -> None:
 
 def test_the_wording_of_a_refusal() -> None:
     with pytest.raises(pt.ParameterError) as caught:
-        pt.Inverse(stage=5)
+        pt.Inverse(stage=5)  # type: ignore[arg-type]
     assert str(caught.value) == "stage is 5: expected a stage, as a pt.DahlStage"
 
 

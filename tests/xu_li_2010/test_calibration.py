@@ -7,9 +7,9 @@ import pytest
 
 import piezotrack as pt
 from piezotrack import _core
-from piezotrack.xu_li_2010 import fig_06_identification
 from piezotrack.xu_li_2010.apparatus import Apparatus, calibration_file
 from piezotrack.xu_li_2010.calibration import calibrate, cost, medians
+from piezotrack.xu_li_2010.experiments import fig_06_identification
 from piezotrack.xu_li_2010.free_parameters import FREE, Free, apparatus_at
 from piezotrack.xu_li_2010.published import observables
 

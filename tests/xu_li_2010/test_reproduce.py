@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.xu_li_2010 import fig_12_14_tracking, fig_15_circles
 from piezotrack.xu_li_2010.conclusions import conclusions
+from piezotrack.xu_li_2010.experiments import fig_12_14_tracking, fig_15_circles
+from piezotrack.xu_li_2010.experiments.table_2 import PUBLISHED
 from piezotrack.xu_li_2010.published import observables
-from piezotrack.xu_li_2010.table_2 import PUBLISHED
 
 if TYPE_CHECKING:
     from pathlib import Path

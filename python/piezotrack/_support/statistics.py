@@ -51,6 +51,9 @@ class ErrorStatistics:
         """
         return cls(**dict(zip(FIGURES, figures, strict=True)))
 
+    def __str__(self) -> str:
+        return f"max {1e6 * self.max_error:.3f} um, rms {1e6 * self.rms_error:.3f} um"
+
 
 FIGURES = tuple(field.name for field in fields(ErrorStatistics))
 

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from .. import _core
-from .._support.files import (
+from .._support.display.progress_bar import ProgressBar
+from .._support.display.result import Result
+from .._support.files.writing import (
     json_ready,
     make_folder,
     picture_files,
@@ -18,8 +20,6 @@ from .._support.files import (
     write_document,
 )
 from .._support.messages import quoted
-from .._support.progress_bar import ProgressBar
-from .._support.result import Result
 from ..errors import ParameterError
 from .board_files import BoardFolder
 from .contenders import contenders_named

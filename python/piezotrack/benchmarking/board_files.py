@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .._support.files import make_folder, write_document
-from .._support.json_text import parse_json
+from .._support.files.json_text import parse_json
+from .._support.files.writing import make_folder, write_document
 from ..errors import DataError
 from .scoring import FORMAT, SCHEMA_VERSION
 

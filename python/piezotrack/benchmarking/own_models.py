@@ -39,7 +39,7 @@ class _Identified:
 
     @property
     def chosen(self) -> str:
-        return self.fit.model.info.title if self.fit.trials else ""
+        return self.fit.model.info.title if self.fit.selection else ""
 
     @property
     def parameters(self) -> dict[str, float]:

@@ -11,27 +11,27 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from .. import __version__
-from .benchmark import benchmark_command
-from .campaign import campaign_command
-from .compare import compare_command
-from .compare_controllers import compare_controllers_command
-from .contour import contour_command
-from .convert import convert_command
-from .demo import demo_command
+from .demonstrations.demo import demo_command
+from .demonstrations.reproduce import reproduce_command
+from .devices.measure import measure_command
+from .devices.serve import serve_command
 from .error_messages import of_the_system
-from .export import export_command
-from .identify import identify_command
-from .info import info_command
-from .learn import learn_command
-from .measure import measure_command
-from .noise import noise_command
-from .play import play_command
-from .reproduce import reproduce_command
-from .serve import serve_command
-from .simulate import simulate_command
-from .step import step_command
-from .track import feedforward_command, track_command
-from .tune import tune_command
+from .logs.convert import convert_command
+from .logs.info import info_command
+from .loops.compare_controllers import compare_controllers_command
+from .loops.contour import contour_command
+from .loops.export import export_command
+from .loops.learn import learn_command
+from .loops.play import play_command
+from .loops.track import feedforward_command, track_command
+from .loops.tune import tune_command
+from .models.benchmark import benchmark_command
+from .models.campaign import campaign_command
+from .models.compare import compare_command
+from .models.identify import identify_command
+from .models.noise import noise_command
+from .models.simulate import simulate_command
+from .models.step import step_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ParamSpec
 
 import typer
 
-from .._support.progress_bar import one_clock
+from .._support.display.progress_bar import one_clock
 from ..errors import PiezotrackError
 from .advice import as_options, options_named
 from .interruption import at_rest, at_work, exit_code, stopped

@@ -74,7 +74,7 @@ class Output:
         """
         files = list(written)
         if self._json:
-            from .._support.files import json_ready
+            from .._support.files.writing import json_ready
 
             whole = json_ready({**document, "written": [str(path) for path in files]})
             print(json_text.dumps(whole, indent=2, allow_nan=False))

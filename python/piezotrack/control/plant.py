@@ -20,6 +20,8 @@ from .timing import Timing
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..stages.inverse import InvertibleStage
+
     Array = NDArray[np.float64]
 
 __all__ = [
@@ -58,7 +60,7 @@ def plant_of(stage: Plant | IdentifiedModel) -> VirtualStage:
 
 
 def displacement_range(
-    stage: VirtualStage | Stage, limits: tuple[float, float], dt: float
+    stage: VirtualStage | InvertibleStage, limits: tuple[float, float], dt: float
 ) -> tuple[float, float]:
     """Simulate the lowest and the highest displacement [m] between two voltages [V].
 
@@ -122,7 +124,7 @@ def lowest_settled_displacement(
 # A loop is run on one stage again and again, and each run asks for its reach twice.
 @lru_cache(maxsize=16)
 def _slow_cycle(
-    stage: VirtualStage | Stage, low: float, high: float, dt: float
+    stage: VirtualStage | InvertibleStage, low: float, high: float, dt: float
 ) -> tuple[Array, Array, Array]:
     """Simulate from `low` slowly to `high` and back [V]: times [s], voltages and displacements."""
     t = np.arange(0.0, 11.0, dt)

@@ -9,9 +9,9 @@ import numpy as np
 
 from .._support.arguments import one_of
 from .._support.arrays import signal_of, time_axis
-from .._support.frames import frame_of
+from .._support.display.frames import frame_of
+from .._support.display.result import Viewed
 from .._support.messages import quoted
-from .._support.result import Viewed
 from .._support.units import best_length_unit
 from ..errors import DataError, ParameterError
 from .dataset_arguments import (

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from .._support.files import replacing, write_columns
+from .._support.files.writing import replacing, write_columns
 from .._support.messages import quoted
 from .._support.units import drive_word, split_unit
 from ..errors import ParameterError

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._support.arrays import check_dt, time_fault
+from .._support.display.table import Column as Cells
+from .._support.display.table import Table
 from .._support.messages import quoted
-from .._support.table import Column as Cells
-from .._support.table import Table
 from .._support.units import drive_text, drive_word, length_text, lookup
 from ..errors import DataError, ParameterError, PiezotrackError
 from .drive_features import (

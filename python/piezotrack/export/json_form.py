@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
-from .c_parts import coefficients_of, shape_of
+from .c99.parts import coefficients_of, shape_of
 
 if TYPE_CHECKING:
     from ..control.controller.controller import Controller

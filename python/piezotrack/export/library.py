@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from .. import _core
 from ..control.laws.neural_network import NETWORK, NetworkInverse
-from .c99 import checked_name
-from .c_check import check_code
-from .c_text import array_lines, literal, named_in
+from .c99.check import check_code
+from .c99.sources import checked_name
+from .c99.text import array_lines, literal, named_in
 from .vectors import rows_of, vectors_text
 
 if TYPE_CHECKING:

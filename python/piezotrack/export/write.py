@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Literal
 
 from .. import _core
 from .._support.arguments import expect, one_of
-from .._support.files import make_folder, replacing, result_set, write_document
+from .._support.files.writing import make_folder, replacing, result_set, write_document
 from ..control.controller.controller import Controller
 from ..errors import ParameterError
 from ..references.reference import Reference
-from .c99 import c_sources, checked_name
-from .c_parts import feedforward_table
-from .fmu import compiler, fmu_bytes
+from .c99.parts import feedforward_table
+from .c99.sources import c_sources, checked_name
+from .fmu.unit import compiler, fmu_bytes
 from .json_form import coefficients_document
 from .library import library_sources
 

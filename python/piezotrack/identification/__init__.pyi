@@ -25,14 +25,16 @@ from .fitted.estimates import Constraint as Constraint
 from .fitted.estimates import Estimate as Estimate
 from .fitted.estimates import LagRange as LagRange
 from .fitted.estimates import Progress as Progress
+from .fitted.estimates import SearchRun as SearchRun
 from .fitted.estimates import SwarmRun as SwarmRun
 from .fitted.fitted_record import FittedRecord as FittedRecord
 from .fitted.identification import Identification as Identification
 from .fitted.identified_model import IdentifiedModel as IdentifiedModel
 from .fitted.model_file import load as load
 from .fitted.score import Score as Score
+from .fitted.selection import Selection as Selection
+from .fitted.selection import Trial as Trial
 from .fitted.start import Start as Start
-from .fitted.trial import Trial as Trial
 from .methods.descents import Descents as Descents
 from .methods.least_squares import LeastSquares as LeastSquares
 from .methods.particle_swarm import ParticleSwarm as ParticleSwarm

@@ -88,7 +88,7 @@ def identify(
     model : str, optional
         Name of the model. By default, ``"auto"``, those that suit the record are fitted to the
         first three fifths of the window and judged on the rest, and the best is fitted to all of
-        it and says so: `Identification.trials`. Searched are ``"dahl"`` (`DahlStage`),
+        it and says so: `Identification.selection`. Searched are ``"dahl"`` (`DahlStage`),
         ``"bouc-wen"`` (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`),
         ``"asymmetric-bouc-wen"`` (`AsymmetricBoucWenStage`), ``"lugre"`` (`LuGreStage`),
         ``"parallel-dahl"`` (`ParallelDahlStage`) and ``"bouc-wen-oscillator"``
@@ -191,7 +191,7 @@ def identify(
     ...     parameters={"mass": 0.1828, "a1": 121.9874, "a2": 1.1773e6, "b1": 1.8485e6},
     ...     method=pt.Descents(seed=1),
     ... )
-    >>> print(f"K = {1e-3 * fit.model.stiffness:.1f} kN/m, {fit.nit > 0}")
+    >>> print(f"K = {1e-3 * fit.model.stiffness:.1f} kN/m, {fit.search.nit > 0}")
     K = 26.1 kN/m, True
     """
     records = records_of(data, offset=offset, delay=delay, drift=drift, history=history)

@@ -1,7 +1,7 @@
 """Stage models.
 
-One file a model, their base classes and registry, their inverse for feedforward, the virtual
-stage to experiment on, and the stage of two axes.
+One file a model, in a folder by family; their base class and registry, their inverse for
+feedforward, the virtual stage to experiment on, and the stage of two axes.
 """
 
 from __future__ import annotations

@@ -3,43 +3,43 @@
 from .apparatus import Amplifier as Amplifier
 from .apparatus import Preconditioning as Preconditioning
 from .apparatus import Sensor as Sensor
-from .asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
-from .asymmetric_prandtl_ishlinskii import (
-    AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
-)
 from .base import Stage as Stage
-from .bouc_wen import BoucWenStage as BoucWenStage
-from .bouc_wen import BoucWenState as BoucWenState
-from .bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
-from .dahl import DahlStage as DahlStage
-from .dahl import DahlState as DahlState
-from .duhem import DuhemStage as DuhemStage
-from .duhem import DuhemState as DuhemState
-from .first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
-from .generalised_prandtl_ishlinskii import (
-    GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
-)
+from .feedback.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
+from .feedback.dahl import DahlStage as DahlStage
+from .feedback.dahl import DahlState as DahlState
+from .feedback.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage
+from .feedback.lugre import LuGreStage as LuGreStage
+from .feedback.lugre import LuGreState as LuGreState
+from .feedback.parallel_dahl import ParallelDahlStage as ParallelDahlStage
+from .feedback.parallel_dahl import ParallelDahlState as ParallelDahlState
+from .input.asymmetric_bouc_wen import AsymmetricBoucWenStage as AsymmetricBoucWenStage
+from .input.bouc_wen import BoucWenStage as BoucWenStage
+from .input.bouc_wen import BoucWenState as BoucWenState
 from .inverse import Inverse as Inverse
 from .inverse import InverseSession as InverseSession
 from .inverse import PlayedVoltage as PlayedVoltage
-from .lugre import LuGreStage as LuGreStage
-from .lugre import LuGreState as LuGreState
-from .maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
 from .motion import ForceState as ForceState
 from .motion import Response as Response
 from .motion import StageState as StageState
-from .parallel_dahl import ParallelDahlStage as ParallelDahlStage
-from .parallel_dahl import ParallelDahlState as ParallelDahlState
-from .polynomial_prandtl_ishlinskii import (
+from .plays.asymmetric_prandtl_ishlinskii import (
+    AsymmetricPrandtlIshlinskiiStage as AsymmetricPrandtlIshlinskiiStage,
+)
+from .plays.generalised_prandtl_ishlinskii import (
+    GeneralisedPrandtlIshlinskiiStage as GeneralisedPrandtlIshlinskiiStage,
+)
+from .plays.maxwell_slip import MaxwellSlipStage as MaxwellSlipStage
+from .plays.polynomial_prandtl_ishlinskii import (
     PolynomialPrandtlIshlinskiiStage as PolynomialPrandtlIshlinskiiStage,
 )
-from .prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
-from .prandtl_ishlinskii import PrandtlIshlinskiiState as PrandtlIshlinskiiState
-from .preisach import PreisachStage as PreisachStage
-from .preisach import PreisachState as PreisachState
-from .rate_dependent_prandtl_ishlinskii import (
+from .plays.prandtl_ishlinskii import PrandtlIshlinskiiStage as PrandtlIshlinskiiStage
+from .plays.prandtl_ishlinskii import PrandtlIshlinskiiState as PrandtlIshlinskiiState
+from .plays.rate_dependent_prandtl_ishlinskii import (
     RateDependentPrandtlIshlinskiiStage as RateDependentPrandtlIshlinskiiStage,
 )
+from .relays.duhem import DuhemStage as DuhemStage
+from .relays.duhem import DuhemState as DuhemState
+from .relays.preisach import PreisachStage as PreisachStage
+from .relays.preisach import PreisachState as PreisachState
 from .virtual import VirtualResponse as VirtualResponse
 from .virtual import VirtualStage as VirtualStage
 from .xy import XYLog as XYLog

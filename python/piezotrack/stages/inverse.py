@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -17,18 +17,40 @@ from ..references.motions import Spline
 from ..references.reference import Reference, SampledReference
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
-    from .motion import StageState
+    from .model_info import ModelInfo
+    from .motion import Named, Response, StageState
 
     Array = NDArray[np.float64]
 
-__all__ = ["Inverse", "InverseSession", "PlayedVoltage"]
+__all__ = ["Inverse", "InverseSession", "InvertibleStage", "PlayedVoltage"]
 
 Playback = Literal["table", "online"]
 Limits = tuple[float, float] | None
 # Periods that the smooth start of a reference with a table may have.
 MOST_TURNS = 1_000_000
+
+
+class InvertibleStage(Protocol):
+    """A stage as its inverse needs it: the stages make inverses, and are not known here."""
+
+    @property
+    def info(self) -> ModelInfo:
+        """Description of the model."""
+
+    @property
+    def _core(self) -> _core.Stage: ...
+
+    @property
+    def _named(self) -> Named: ...
+
+    def _checked(self, initial: object) -> StageState: ...
+
+    def __hash__(self) -> int: ...
+
+    def simulate(self, u: ArrayLike, dt: float) -> Response:
+        """Simulate the motion for a drive."""
 
 
 class PlayedVoltage(NamedTuple):
@@ -97,8 +119,7 @@ class Inverse:
     True
     """
 
-    # A stage of any model: the stages make inverses, and are not known here.
-    stage: Any
+    stage: InvertibleStage
     offset: float = 0.0
     delay: float = 0.0
     playback: Playback = "table"
@@ -127,10 +148,7 @@ class Inverse:
 
     def _inverse(self, dt: float) -> _core.Inverse:
         initial = None if self.initial is None else self.stage._checked(self.initial)._named
-        core: _core.Inverse = self.stage._core.inverse(
-            dt, offset=self.offset, delay=self.delay, initial=initial
-        )
-        return core
+        return self.stage._core.inverse(dt, offset=self.offset, delay=self.delay, initial=initial)
 
     def voltage(
         self,

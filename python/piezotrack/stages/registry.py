@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from difflib import get_close_matches
 from importlib import import_module
+from importlib.util import find_spec
 
 from .._support.messages import quoted
 from ..errors import ParameterError
@@ -15,6 +16,8 @@ __all__ = ["MODELS", "ModelInfo", "Stage", "model_named", "model_of", "stage_cla
 
 # The models as the core lists them, in its order.
 MODELS: tuple[ModelInfo, ...] = tuple(LISTED.values())
+# The packages of their modules.
+FAMILIES = ("feedback", "input", "plays", "relays")
 # A longer text is no misspelt name.
 LONGEST_NAME = 100
 
@@ -61,7 +64,7 @@ def _meant(name: object) -> str | None:
 
 
 def stage_class(model: ModelInfo) -> type[Stage]:
-    """Find the class of a model, in the module of the same name.
+    """Find the class of a model, in the module of the same name of a family.
 
     Parameters
     ----------
@@ -74,7 +77,8 @@ def stage_class(model: ModelInfo) -> type[Stage]:
         The class of its stages.
     """
     if model.name not in REGISTERED:
-        import_module(f".{model.name.replace('-', '_')}", __package__)
+        homes = [f"{__package__}.{one}.{model.name.replace('-', '_')}" for one in FAMILIES]
+        import_module(next(home for home in homes if find_spec(home)))
     return REGISTERED[model.name]
 
 

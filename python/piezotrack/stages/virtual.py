@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from ..data.dataset import Hold
+    from .inverse import InvertibleStage
 
     Array = NDArray[np.float64]
 
@@ -157,7 +158,7 @@ class VirtualStage:
     @classmethod
     def of(
         cls,
-        stage: Stage | _Identified,
+        stage: InvertibleStage | _Identified,
         *,
         noise: float = 0.0,
         noise_bandwidth: float = math.inf,

@@ -6,13 +6,13 @@ from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-from .._support.json_text import parse_json
+from .._support.files.json_text import parse_json
 from .._support.messages import quoted
 from ..control.controller.controller import Controller
 from ..control.timing import Timing
 from ..errors import ParameterError
 from ..stages.apparatus import Amplifier, Preconditioning, Sensor
-from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ..stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
 from ..stages.xy import XYStage
 

@@ -16,11 +16,11 @@ from ..errors import PiezotrackError
 from ..identification.fit import identify
 from ..identification.methods.descents import Descents
 from ..identification.methods.particle_swarm import ParticleSwarm
-from ..stages.dahl import DahlStage
-from . import fig_04_step_test, fig_06_identification, fig_12_14_tracking, fig_15_circles
+from ..stages.feedback.dahl import DahlStage
 from .apparatus import loop
+from .experiments import fig_04_step_test, fig_06_identification, fig_12_14_tracking, fig_15_circles
+from .experiments.procedure import FITTED_SECONDS, SEARCH_BOX
 from .free_parameters import FREE, SEED, Free, apparatus_at, theta_at
-from .procedure import FITTED_SECONDS, SEARCH_BOX
 from .published import observables
 
 if TYPE_CHECKING:

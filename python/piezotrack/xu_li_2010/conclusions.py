@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .table_2 import PUBLISHED
+from .experiments.table_2 import PUBLISHED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -13,9 +13,9 @@ from ..control.running.track import track
 from ..identification.fit import identify
 from ..identification.methods.descents import Descents
 from ..references.waveforms import sine
-from ..stages.dahl import DahlStage
+from ..stages.feedback.dahl import DahlStage
 from ..stages.virtual import VirtualStage
-from .procedure import FITTED_SECONDS, SEARCH_BOX
+from .experiments.procedure import FITTED_SECONDS, SEARCH_BOX
 
 if TYPE_CHECKING:
     from collections.abc import Callable

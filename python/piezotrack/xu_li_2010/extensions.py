@@ -14,10 +14,10 @@ from ..data.dataset import Dataset
 from ..errors import NumericalError, ParameterError
 from ..identification.fit import identify
 from ..identification.methods.descents import Descents
-from ..stages.dahl import DahlStage
-from . import fig_06_identification, fig_07_model_comparison, fig_12_14_tracking
+from ..stages.feedback.dahl import DahlStage
 from .apparatus import DT, loop
-from .references import HIGH, LOW, RANGE, fast, slow
+from .experiments import fig_06_identification, fig_07_model_comparison, fig_12_14_tracking
+from .experiments.references import HIGH, LOW, RANGE, fast, slow
 from .section import Section
 
 if TYPE_CHECKING:

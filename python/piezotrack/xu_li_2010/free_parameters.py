@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..identification.experiments.step_readings import StepReadings
-from ..stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ..stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
 from ..stages.xy import XYStage
-from . import fig_04_step_test
 from .apparatus import Apparatus
+from .experiments import fig_04_step_test
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

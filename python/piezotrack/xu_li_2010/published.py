@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from .._support.json_text import parse_json
+from .._support.files.json_text import parse_json
 from ..identification.experiments.step_readings import StepReadings
-from ..stages.dahl import DahlStage
-from .table_2 import PUBLISHED, Published
+from ..stages.feedback.dahl import DahlStage
+from .experiments.table_2 import PUBLISHED, Published
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

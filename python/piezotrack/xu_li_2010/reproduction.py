@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from .. import _core
-from .._support.progress_bar import ProgressBar
-from .._support.result import Result
+from .._support.display.progress_bar import ProgressBar
+from .._support.display.result import Result
 from .._support.two_threads import one_by_one, two_threads
 from ..errors import ParameterError
 from .apparatus import Apparatus, calibration_file
 from .conclusions import Conclusion, conclusions
+from .experiments.references import RULES
 from .extensions import sections
 from .measured_log import Drives, drives
 from .published import SI, Obtained, gathered
-from .references import RULES
 from .run import Experiments, run_experiments
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from . import (
+from .experiments import (
     fig_03_sensor_at_rest,
     fig_04_step_test,
     fig_06_identification,
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from ..identification.fitted.identification import Identification
     from ..stages.xy import XYStage
     from .apparatus import Apparatus
-    from .fig_12_14_tracking import Runs
-    from .table_2 import Table2
+    from .experiments.fig_12_14_tracking import Runs
+    from .experiments.table_2 import Table2
 
 __all__ = ["Experiments", "run_experiments"]
 

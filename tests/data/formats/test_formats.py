@@ -68,7 +68,7 @@ def test_every_extra_of_a_format_is_in_the_one_of_all() -> None:
 
 
 def test_every_file_of_a_format_is_in_the_list_and_on_the_page() -> None:
-    files = [path for path in FOLDER.glob("*.py") if "Format(" in path.read_text(encoding="utf-8")]
+    files = [path for path in FOLDER.rglob("*.py") if "Format(" in path.read_text(encoding="utf-8")]
     # NPZ and NPY are one file.
     assert len(FORMATS) == len(files) + 1
     for known in FORMATS:

@@ -12,7 +12,7 @@ import pytest
 import piezotrack as pt
 from format_logs import DT, T, U, Y, is_the_log, refusal, survives
 from log_writers import MAT_HEADER, mat_array, mat_element
-from piezotrack.data.formats.mat_elements import read_variables
+from piezotrack.data.formats.binary.mat_elements import read_variables
 from piezotrack.data.formats.source import Source
 
 scipy_io = pytest.importorskip("scipy.io")

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...data.dataset import Dataset
-from ...stages.bouc_wen_oscillator import BoucWenOscillator
+from ...stages.feedback.bouc_wen_oscillator import BoucWenOscillator
 from ..record import BenchmarkRecord
 
 if TYPE_CHECKING:

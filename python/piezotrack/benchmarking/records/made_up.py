@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...data.dataset import Dataset
-from ...stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ...stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..record import BenchmarkRecord
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import math
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
-from ..._support.plot_style import LEVEL, folded, literal, panels, whole
+from ..._support.display.plot_style import LEVEL, folded, literal, panels, whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

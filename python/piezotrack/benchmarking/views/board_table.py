@@ -6,7 +6,7 @@ import math
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from ..._support.table import Column, Table
+from ..._support.display.table import Column, Table
 
 if TYPE_CHECKING:
     from ..board import Benchmark, BenchmarkResult, PartScore

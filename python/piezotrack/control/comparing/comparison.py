@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from statistics import fmean, median, stdev
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from ..._support.files import write_result
-from ..._support.result import Result
+from ..._support.display.result import Result
+from ..._support.files.writing import write_result
 
 if TYPE_CHECKING:
     import os

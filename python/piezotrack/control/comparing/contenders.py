@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ... import _core
 from ...errors import ParameterError
-from ...stages.dahl import DahlStage
+from ...stages.feedback.dahl import DahlStage
 from ..controller.controller import Controller
 from ..laws.hysteresis_observer import HysteresisObserver
 from ..laws.neural_network import train_network
 from ..learning.learn import learn
 from ..loop.tracking import can_be_learnt
 from ..tuning.goal import Goal
-from ..tuning.h_infinity import mixed_sensitivity
+from ..tuning.linear.h_infinity import mixed_sensitivity
 from ..tuning.margins import Margins, Spread, plants_of
 from ..tuning.schedule import schedule
 from ..tuning.tune import tune

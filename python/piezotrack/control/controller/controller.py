@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, runtime_check
 from ... import _core
 from ..._support.arguments import TOO_FAR, expect, number_pair, one_of
 from ..._support.arrays import check_dt
-from ..._support.files import write_document
+from ..._support.files.writing import write_document
 from ..._support.units import shown_unit
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
@@ -38,7 +38,11 @@ WIDEST = 0.01
 
 @runtime_checkable
 class DesignReport(Protocol):
-    """Report of the margins of a controller, as `check_loop` and `tune` return it."""
+    """Report of the margins of controllers, as `check_loop` and `tune` return it."""
+
+    @property
+    def controllers(self) -> tuple[Controller, ...]:
+        """The controllers."""
 
     def design(self) -> dict[str, Any]:
         """Margins for the file of the controller: numbers, texts, lists and dicts only."""
@@ -271,7 +275,7 @@ class Controller:
 
         Parameters
         ----------
-        report : LoopReport, TuningReport or Tuned, optional
+        report : LoopReport or Tuned, optional
             As in `save`.
 
         Returns
@@ -318,7 +322,7 @@ class Controller:
             raise ParameterError(
                 f"report is {type(report).__name__}: expected what pt.check_loop or pt.tune returns"
             )
-        if getattr(report, "controller", self) != self:
+        if self not in report.controllers:
             raise ParameterError("report is of another controller: expected that of this one")
         return report.design()
 
@@ -333,7 +337,7 @@ class Controller:
         ----------
         path : path-like
             The file.
-        report : LoopReport, TuningReport or Tuned, optional
+        report : LoopReport or Tuned, optional
             Margins of this controller, from `check_loop` or `tune`. Without a report the margins of
             the file that the controller was read from are kept.
 

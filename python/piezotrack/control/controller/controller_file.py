@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from ... import _core
-from ..._support.json_text import object_of
+from ..._support.files.json_text import object_of
 from ..._support.messages import quoted
 from ...errors import ParameterError
 from ...identification.fitted.start import state_entry, state_of

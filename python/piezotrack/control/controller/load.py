@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.json_text import object_of
+from ..._support.files.json_text import object_of
 from ..._support.messages import quoted
 from ...errors import DataError, ParameterError
 from ...identification.fitted.model_file import entries_of, read_content

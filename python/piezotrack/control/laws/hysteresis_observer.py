@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from ..._support.arguments import finite, positive
 from ...errors import ParameterError
-from ...stages.bouc_wen import BoucWenStage
-from ...stages.dahl import DahlStage
+from ...stages.feedback.dahl import DahlStage
+from ...stages.input.bouc_wen import BoucWenStage
 from ..parts.part import FeedbackLaw, part
 from .pid import Pid
 

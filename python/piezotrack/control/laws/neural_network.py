@@ -14,7 +14,7 @@ from ..._support.messages import quoted
 from ...data.dataset import Dataset
 from ...errors import DataError, NumericalError, ParameterError, PiezotrackError
 from ...stages.inverse import Inverse
-from ...stages.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ...stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -9,8 +9,8 @@ import numpy as np
 
 from ... import _core
 from ..._support.arguments import given_or
-from ..._support.files import write_columns
-from ..._support.result import Result
+from ..._support.display.result import Result
+from ..._support.files.writing import write_columns
 from ..._support.units import drive_word, shown_unit
 from ...errors import DataError, DeviceError, Interrupted, ParameterError
 from ...hardware.device import Device

@@ -10,9 +10,9 @@ import numpy as np
 
 from ... import _core
 from ..._support.arguments import number_pair
-from ..._support.files import write_result
-from ..._support.frames import frame_of
-from ..._support.result import Result
+from ..._support.display.frames import frame_of
+from ..._support.display.result import Result
+from ..._support.files.writing import write_result
 from ..._support.statistics import ErrorStatistics
 from ..._support.units import drive_word, shown_unit
 from ...errors import ParameterError

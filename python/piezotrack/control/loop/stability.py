@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import _core
 from ..._support.arguments import expect, not_negative
-from ..._support.result import Result
+from ..._support.display.result import Result
 from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ..controller.controller import Controller
@@ -201,6 +201,11 @@ class LoopReport(Result):
     def __repr__(self) -> str:
         elsewhere = "" if self.everywhere == self.stable else "; not at every gain of the stage"
         return f"<LoopReport at {self.middle}{elsewhere}>"
+
+    @property
+    def controllers(self) -> tuple[Controller]:
+        """The controller, as a tuple."""
+        return (self.controller,)
 
     @property
     def cases(self) -> tuple[tuple[str, LoopCheck], ...]:

@@ -12,9 +12,9 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import not_negative
 from ..._support.arrays import signal_of
-from ..._support.files import write_result
-from ..._support.frames import frame_of
-from ..._support.result import Result
+from ..._support.display.frames import frame_of
+from ..._support.display.result import Result
+from ..._support.files.writing import write_result
 from ..._support.statistics import FIGURES, ErrorStatistics
 from ..._support.units import drive_word, shown_unit
 from ...errors import ParameterError
@@ -56,7 +56,7 @@ class Metrics(ErrorStatistics):
     widest_loop: float | None
 
     def __str__(self) -> str:
-        text = f"max {1e6 * self.max_error:.3f} um, rms {1e6 * self.rms_error:.3f} um"
+        text = super().__str__()
         if self.phase_lag is not None:
             text += f", phase lag {self.phase_lag:.4f} rad"
         if self.widest_loop is not None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ... import _core
 from ..._support.arguments import as_numbers
-from ..._support.json_text import object_of
+from ..._support.files.json_text import object_of
 from ..._support.messages import quoted
 from ...errors import ParameterError
 from ...identification.fitted.model_entries import parameter_entries
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from ...stages.base import Stage
+    from ...stages.inverse import InvertibleStage
     from .part_info import Number
 
 __all__ = ["only", "part_entry", "part_of", "stage_entry", "stage_of"]
@@ -72,7 +73,7 @@ def _written(form: str, value: Any, drive: str) -> Any:
     return INFINITE if math.isinf(number) else number
 
 
-def stage_entry(stage: Stage, drive: str) -> dict[str, Any]:
+def stage_entry(stage: InvertibleStage, drive: str) -> dict[str, Any]:
     """Entry of a stage: its model, and its parameters with their units."""
     return {"model": stage.info.name, "parameters": parameter_entries(stage, drive)}
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence, Sized
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, Unpack, overload
+from collections.abc import Callable, Mapping, Sequence, Sized
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
 import numpy as np
 
 from ... import _core
+from ..._support.display.frames import frame_of
+from ..._support.display.result import Result
+from ..._support.files.writing import write_result
 from ..._support.messages import quoted
-from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ...references.paths import circle
 from ...references.reference import Reference
@@ -24,19 +26,22 @@ from ..running.track import track
 from ..timing import Timing
 from .margins import Margins, Spread, plants_of
 from .tune import tune
-from .tuned import Tuned, TunedPair
 
 if TYPE_CHECKING:
+    import os
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     from ...identification.fitted.identified_model import IdentifiedModel
     from ..controller.controller import Controller
     from ..plant import Plant
     from .tune import TuneOptions
+    from .tuned import Tuned
 
     Array = NDArray[np.float64]
 
-__all__ = ["Schedule", "SchedulePair", "schedule"]
+__all__ = ["Schedule", "schedule"]
 
 # Periods along which a reference of the grid is followed: the first is its smooth start.
 PERIODS = 4
@@ -48,91 +53,126 @@ Waveform = Callable[[float, float], Reference]
 PathForm = Callable[[float, float], XYReference]
 
 
-class SchedulePair(NamedTuple):
-    """Scheduled gains of both axes of an XY stage beside one fixed set for all paths.
-
-    Attributes
-    ----------
-    controllers : (Controller, Controller)
-        Of x and y, with scheduled gains.
-    fixed : TunedPair
-        One set of gains for each axis, for all paths of the grid.
-    tuned : tuple of TunedPair
-        For each radius the gains at each rate.
-    errors : ndarray, shape (amplitudes, rates, 2)
-        Rms contour error with the fixed and with the scheduled gains [m].
-    """
-
-    controllers: tuple[Controller, Controller]
-    fixed: TunedPair
-    tuned: tuple[TunedPair, ...]
-    errors: Array
-
-    def __str__(self) -> str:
-        return "\n".join(
-            f"{name}\n{_text(controller, self.errors)}"
-            for name, controller in zip("xy", self.controllers, strict=True)
-        )
-
-
-class Schedule(NamedTuple):
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Schedule(Result):
     """Scheduled gains beside one fixed set for all references.
 
+    Its picture is the errors with both.
+
     Attributes
     ----------
-    controller : Controller
-        With scheduled gains.
+    controllers : tuple of Controller
+        With scheduled gains: one, of an XY stage those of x and y.
     fixed : Tuned
         One set of gains for all references of the grid.
     tuned : tuple of Tuned
-        For each amplitude the gains at each rate.
+        For each amplitude, or radius, the gains at each rate.
     errors : ndarray, shape (amplitudes, rates, 2)
-        Rms error with the fixed and with the scheduled gains [m].
+        Rms error, or contour error, with the fixed and with the scheduled gains [m].
     """
 
-    controller: Controller
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "control.views.tuning:schedule_text",
+        "plot": "control.views.tuning:plot_schedule",
+    }
+
+    controllers: tuple[Controller, ...]
     fixed: Tuned
     tuned: tuple[Tuned, ...]
     errors: Array
 
-    def __str__(self) -> str:
-        return _text(self.controller, self.errors)
+    @property
+    def controller(self) -> Controller:
+        """The controller; of an XY stage that of x."""
+        return self.controllers[0]
+
+    @property
+    def amplitudes(self) -> tuple[float, ...]:
+        """Amplitudes, or radii, of the grid [m]."""
+        law: Any = self.controller.feedback
+        return tuple(law.amplitudes)
+
+    @property
+    def rates(self) -> tuple[float, ...]:
+        """Rates of the grid [Hz]."""
+        law: Any = self.controller.feedback
+        return tuple(law.rates)
+
+    def __repr__(self) -> str:
+        return f"<Schedule: {len(self.amplitudes)} amplitudes, {len(self.rates)} rates>"
+
+    @property
+    def table(self) -> dict[str, Array]:
+        """Columns with errors and gains at each place of the grid, units in the names.
+
+        Those of an XY stage begin with ``x_`` and ``y_``.
+        """
+        errors = self.errors.reshape(-1, 2)
+        columns = {
+            "amplitude_m": np.repeat(self.amplitudes, len(self.rates)),
+            "rate_Hz": np.tile(self.rates, len(self.amplitudes)),
+            "fixed_rms_m": errors[:, 0],
+            "scheduled_rms_m": errors[:, 1],
+        }
+        prefixes = ("",) if len(self.controllers) == 1 else ("x_", "y_")
+        for prefix, one in zip(prefixes, self.controllers, strict=True):
+            law: Any = one.feedback
+            for name, unit in (("kp", f"{one.drive_unit}_per_m"), ("ti", "s"), ("td", "s")):
+                gains = [getattr(gains, name) for gains in law.gains]
+                columns[f"{prefix}{name}_{unit}"] = np.array(gains)
+        return columns
+
+    def to_frame(self) -> Any:
+        """Return the grid as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            With the columns of `table`.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+        """
+        return frame_of(self.table)
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only: the columns of `table`.
+        """
+        return {
+            "format": "piezotrack-schedule",
+            "schema_version": 1,
+            "columns": {name: values.tolist() for name, values in self.table.items()},
+            "provenance": {"package": "piezotrack", "version": _core.__version__},
+        }
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write the grid and the picture to a folder, in one go.
+
+        Parameters
+        ----------
+        folder : path-like
+            It is made where it does not exist.
+
+        Returns
+        -------
+        list of pathlib.Path
+            ``schedule.csv``, ``schedule.json``, ``schedule.png`` and ``.svg``.
+
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
+        """
+        return write_result(folder, "schedule", self.document(), self.plot(), self.table)
 
 
-def _text(controller: Controller, table: Array) -> str:
-    law: Any = controller.feedback
-    unit, scale = shown_unit(controller.drive_unit)
-    lines = [f"amplitude um  rate Hz  kp {unit}/um    ti ms    td ms   rms um: fixed, scheduled"]
-    pairs = [(amplitude, rate) for amplitude in law.amplitudes for rate in law.rates]
-    errors = table.reshape(-1, 2)
-    for (amplitude, rate), one, (before, after) in zip(pairs, law.gains, errors, strict=True):
-        lines.append(
-            f"{1e6 * amplitude:>12g} {rate:>8g} {1e-6 * scale * one.kp:>8.4g} "
-            f"{1e3 * one.ti:>8.3g} {1e3 * one.td:>8.3g}   {1e6 * before:.4f}, {1e6 * after:.4f}"
-        )
-    return "\n".join(lines)
-
-
-@overload
-def schedule(
-    stage: XYStage,
-    amplitudes: Sequence[float],
-    rates: Sequence[float],
-    *,
-    centre: tuple[float, float] | None = None,
-    waveform: PathForm | None = None,
-    **options: Unpack[TuneOptions],
-) -> SchedulePair: ...
-@overload
-def schedule(
-    stage: Plant | IdentifiedModel | Sequence[Plant | IdentifiedModel],
-    amplitudes: Sequence[float],
-    rates: Sequence[float],
-    *,
-    centre: float | None = None,
-    waveform: Waveform | None = None,
-    **options: Unpack[TuneOptions],
-) -> Schedule: ...
 def schedule(
     stage: Plant | IdentifiedModel | Sequence[Plant | IdentifiedModel] | XYStage,
     amplitudes: Sequence[float],
@@ -141,7 +181,7 @@ def schedule(
     centre: float | tuple[float, float] | None = None,
     waveform: Waveform | PathForm | None = None,
     **options: Unpack[TuneOptions],
-) -> Schedule | SchedulePair:
+) -> Schedule:
     """Tune PID gains at each amplitude and rate of a grid, for one controller without bumps.
 
     First one set of gains and filters is tuned for all references of the grid. Then, with those
@@ -168,8 +208,8 @@ def schedule(
 
     Returns
     -------
-    Schedule or SchedulePair
-        The controller, or both, the fixed set, and the errors with both.
+    Schedule
+        The controller, of an XY stage both, the fixed set, and the errors with both.
 
     Raises
     ------
@@ -204,7 +244,7 @@ def schedule(
     common: dict[str, Any] = {**options}
     search: Any = tune
     fixed = search(stage, references, parts=parts, **common)
-    loops = _loops(fixed)
+    loops = fixed.controllers
     common |= {"dt": loops[0].dt, "limits": loops[0].limits}
     common["filters"] = tuple(one.filters for one in loops) if both else loops[0].filters
     timing = options.get("timing") or Timing()
@@ -221,24 +261,22 @@ def schedule(
         plants = plants_of(stages, controller.limits, timing.delay, spread)
         _check_between(controller, [one.plant for one in plants], margins)
     table = errors.reshape(len(grid.amplitudes), len(grid.rates), 2)
-    if both:
-        return SchedulePair((scheduled[0], scheduled[1]), fixed, tuple(chosen), table)
-    return Schedule(scheduled[0], fixed, tuple(chosen), table)
+    return Schedule(controllers=tuple(scheduled), fixed=fixed, tuned=tuple(chosen), errors=table)
 
 
 def _chosen(
     stage: Any,
     motions: Sequence[tuple[tuple[float, float], Any]],
     tuned: Sequence[Any],
-    fixed: Tuned | TunedPair,
+    fixed: Tuned,
     grid: ScheduledPid,
     timing: Timing,
 ) -> tuple[list[Any], list[Controller], Array]:
     """Take the gains of a place where they are better in the schedule, else the fixed ones."""
-    before = [one.metrics.rms_error for one in fixed.report.runs]
+    before = [one.metrics.rms_error for one in fixed.runs]
     chosen = list(tuned)
     while True:
-        loops = enumerate(_loops(fixed))
+        loops = enumerate(fixed.controllers)
         scheduled = [_scheduled(grid, loop, chosen, axis) for axis, loop in loops]
         after = [_error(stage, scheduled, place, one, timing) for place, one in motions]
         # A search for one reference alone may miss what that for all has found; and in the schedule
@@ -250,7 +288,7 @@ def _chosen(
 
 
 def _scheduled(grid: ScheduledPid, loop: Controller, tuned: Sequence[Any], axis: int) -> Controller:
-    gains: list[Any] = [_loops(one)[axis].feedback for one in tuned]
+    gains: list[Any] = [one.controllers[axis].feedback for one in tuned]
     return replace(loop, feedback=replace(grid, gains=gains))
 
 
@@ -272,10 +310,6 @@ def _error(
         return contour(stage, loops, reference, **how).metrics.rms_error
     first = stage[0] if isinstance(stage, Sequence) else stage
     return track(first, loops[0], reference, **how).metrics.rms_error
-
-
-def _loops(tuned: Tuned | TunedPair) -> tuple[Controller, ...]:
-    return tuned.controllers if isinstance(tuned, TunedPair) else (tuned.controller,)
 
 
 def _waveform(both: bool, centre: Any) -> Any:

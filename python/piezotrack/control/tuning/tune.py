@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 from ...errors import ParameterError
 from ..loop.contouring import contour
@@ -12,7 +12,7 @@ from .goal import MINIMISED
 from .problem import TuningProblem
 from .refusal import refusal
 from .search import Solution, search_at
-from .tuned import Tuned, TunedPair, TuningReport
+from .tuned import Tuned
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -52,16 +52,6 @@ class TuneOptions(TypedDict, total=False):
     threads: int
 
 
-@overload
-def tune(
-    stage: XYStage, reference: XYReference | Sequence[XYReference], **options: Unpack[TuneOptions]
-) -> TunedPair: ...
-@overload
-def tune(
-    stage: Plant | IdentifiedModel | Sequence[Plant | IdentifiedModel],
-    reference: Reference | Sequence[Reference] | None = None,
-    **options: Unpack[TuneOptions],
-) -> Tuned: ...
 def tune(
     stage: Plant | IdentifiedModel | Sequence[Plant | IdentifiedModel] | XYStage,
     reference: Reference | Sequence[Reference] | XYReference | Sequence[XYReference] | None = None,
@@ -78,7 +68,7 @@ def tune(
     timing: Timing | None = None,
     search: TuningSearch | None = None,
     threads: int = 0,
-) -> Tuned | TunedPair:
+) -> Tuned:
     """Find the gains of a controller, its filters and its repetitive part.
 
     A swarm evaluates controllers in closed loop with the stage, with its noise, quantisation,
@@ -89,9 +79,9 @@ def tune(
     keeps them (Panagopoulos, Astrom and Hagglund 2002, doi 10.1049/ip-cta:20020013).
 
     For an XY stage the error is the contour error, and each axis gets a controller of its own:
-    ``controllers, report = pt.tune(xy_stage, path, ...)``, for `contour`. The search takes what
+    ``x, y = pt.tune(xy_stage, path, ...).controllers``, for `contour`. The search takes what
     cross-talk adds from where the other axis is to be, and knows no missed ticks; the runs of the
-    report have both in full.
+    result have both in full.
 
     Parameters
     ----------
@@ -136,9 +126,8 @@ def tune(
 
     Returns
     -------
-    Tuned or TunedPair
-        The controller and the report: ``controller, report = pt.tune(...)``; for an XY stage both
-        controllers in place of one.
+    Tuned
+        The controller, of an XY stage both, with its runs, its margins and what limits it.
 
     Raises
     ------
@@ -152,8 +141,8 @@ def tune(
     >>> stage = pt.stages.PrandtlIshlinskiiStage(
     ...     linear=1e-6, thresholds=[10.0], weights=[0.2e-6], frequency=200.0, damping_ratio=0.05
     ... )
-    >>> controller, report = pt.tune(stage, dt=1e-3, limits=(0.0, 75.0), parts="pid")
-    >>> report.kept[-1].name, report.kept[-1].value < 2.01
+    >>> tuned = pt.tune(stage, dt=1e-3, limits=(0.0, 75.0), parts="pid")
+    >>> tuned.kept[-1].name, tuned.kept[-1].value < 2.01
     ('sensitivity', True)
     """
     problem = TuningProblem.checked(
@@ -185,13 +174,12 @@ def _rank(solution: Solution) -> tuple[bool, float, float]:
     return not solution.feasible, nearest, solution.outcome["cost"]
 
 
-def _simulated(
-    problem: TuningProblem, best: Solution, solutions: list[Solution]
-) -> Tuned | TunedPair:
+def _simulated(problem: TuningProblem, best: Solution, solutions: list[Solution]) -> Tuned:
     """Simulate the best controllers in full."""
     controllers = best.controllers
     runs = tuple(_run(problem, controllers, reference) for reference in problem.references)
-    report = TuningReport(
+    return Tuned(
+        controllers=tuple(controllers),
         minimised=_minimised(problem),
         unit="V" if problem.goal.minimise == "effort" and runs else "m",
         value=best.outcome["cost"] * (1.0 if runs else controllers[0].dt),
@@ -200,15 +188,10 @@ def _simulated(
         margins=problem.margins,
         plants=tuple(best.names),
         active_constraints=tuple(_active_constraints(problem, best)),
-        dt=controllers[0].dt,
         candidates=sum(one.outcome["candidates"] for one in solutions),
         loops=sum(one.outcome["loops"] for one in solutions),
         history=tuple(best.outcome["history"]),
     )
-    if problem.stage is not None:
-        x, y = controllers
-        return TunedPair((x, y), report)
-    return Tuned(controllers[0], report)
 
 
 def _minimised(problem: TuningProblem) -> str:

@@ -1,21 +1,27 @@
-"""Result of a tuning: the controller, its margins, and the active constraints."""
+"""Result of a tuning: the controllers, their margins, and the active constraints."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from ..._support.units import shown_unit
+from ... import _core
+from ..._support.display.result import Result
+from ..._support.files.writing import make_folder, result_set, save_figures, write_document
 from ..loop.contouring import Contour
 
 if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from ...references.reference import Reference
+    from ...references.xy_reference import XYReference
     from ..controller.controller import Controller
     from ..loop.tracking import Tracking
-    from ..parts.filters import Filter
-    from ..parts.repetitive import Repetitive
     from .margins import Margins
 
-__all__ = ["MarginReport", "Tuned", "TunedPair", "TuningReport", "parts_text"]
+__all__ = ["MarginReport", "Tuned", "motion_of", "picture_name"]
 
 UNITS = {"gain margin": "", "phase margin": " rad", "sensitivity": "", "learning": ""}
 
@@ -54,11 +60,15 @@ class MarginReport(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class TuningReport:
-    """Report of a tuning: runs, margins, active constraints, effort of the search.
+class Tuned(Result):
+    """Tuned controllers, with their runs, margins, active constraints and the effort of the search.
+
+    Its picture is the figure that was made small, after each iteration.
 
     Attributes
     ----------
+    controllers : tuple of Controller
+        To be used as they are: one, of an XY stage those of x and y for `contour`.
     minimised : str
         The figure that was made small.
     unit : str
@@ -77,14 +87,18 @@ class TuningReport:
     active_constraints : tuple of str
         What forbids a smaller value: margins and bounds of the goal that are used up, settings at
         the ends of their ranges. Empty where the value has its minimum inside.
-    dt : float
-        Sampling interval [s].
     candidates, loops : int
         Controllers evaluated, and closed loops simulated.
     history : tuple of float
         Best figure after each iteration; infinite as long as no candidate kept the margins.
     """
 
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "control.views.tuning:tuned_text",
+        "plot": "control.views.tuning:plot_tuned",
+    }
+
+    controllers: tuple[Controller, ...]
     minimised: str
     value: float
     runs: tuple[Any, ...]
@@ -92,34 +106,21 @@ class TuningReport:
     margins: Margins
     plants: tuple[str, ...]
     active_constraints: tuple[str, ...]
-    dt: float
     candidates: int
     loops: int
     history: tuple[float, ...]
     unit: str = "m"
 
-    def __str__(self) -> str:
-        lines = [
-            f"{self.minimised}, at {1.0 / self.dt:.6g} Hz: {self.candidates} controllers "
-            f"evaluated, {self.loops} loops simulated"
-        ]
-        if self.runs:
-            scale, unit = (1e6, "um") if self.unit == "m" else (1.0, self.unit)
-            lines.append(
-                f"{scale * self.value:.4g} {unit} after settling, and after learning where "
-                "something learns"
-            )
-        for run in self.runs:
-            lines += _run_lines(run)
-        lines.append(f"over {len(self.plants)} plants:")
-        lines += [f"  {one}" for one in self.kept]
-        active = "; ".join(self.active_constraints)
-        active = active or "none: the minimum lies inside the bounds"
-        lines.append(f"active constraints: {active}")
-        return "\n".join(lines)
+    @property
+    def controller(self) -> Controller:
+        """The controller; of an XY stage that of x."""
+        return self.controllers[0]
+
+    def __repr__(self) -> str:
+        return f"<Tuned: {self.minimised}, {len(self.plants)} plants>"
 
     def design(self) -> dict[str, Any]:
-        """Margins for the file of the controller.
+        """Margins for the file of a controller.
 
         Returns
         -------
@@ -135,92 +136,84 @@ class TuningReport:
             "binding": list(self.active_constraints),
         }
 
-    def __repr__(self) -> str:
-        return f"<TuningReport: {self.minimised}, {len(self.plants)} plants>"
-
-
-class Tuned(NamedTuple):
-    """A tuned controller and the report of its search.
-
-    Attributes
-    ----------
-    controller : Controller
-        To be used as it is.
-    report : TuningReport
-        Its margins and active constraints.
-    """
-
-    controller: Controller
-    report: TuningReport
-
-    def __str__(self) -> str:
-        return f"{parts_text(self.controller)}\n{self.report}"
-
-    def design(self) -> dict[str, Any]:
-        """Margins for the file of the controller, those of `report`.
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
 
         Returns
         -------
         dict
-            Of numbers, texts, lists and dicts only.
+            Of numbers, texts, lists and dicts only: the settings, those of an XY stage under
+            ``axes``, and what they keep.
         """
-        return self.report.design()
+        axes = [_settings(one) for one in self.controllers]
+        return {
+            "format": "piezotrack-tuning",
+            "schema_version": 1,
+            **(axes[0] if len(axes) == 1 else {"axes": axes}),
+            "unit": "gains in V/m, times in s, frequencies in Hz, errors in m, phase margin in rad",
+            "references": [
+                {"reference": repr(motion_of(run)), "metrics": asdict(run.metrics)}
+                for run in self.runs
+            ],
+            "kept": [one._asdict() for one in self.kept],
+            "plants": list(self.plants),
+            "binding": list(self.active_constraints),
+            "controllers": self.candidates,
+            "loops": self.loops,
+            "provenance": {"package": "piezotrack", "version": _core.__version__},
+        }
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write settings, controllers, and a picture of the loop along each reference, in one go.
+
+        Parameters
+        ----------
+        folder : path-like
+            It is made where it does not exist.
+
+        Returns
+        -------
+        list of pathlib.Path
+            ``tuning.json``, ``controller.json`` or ``controller_x.json`` and ``controller_y.json``,
+            ``tuned.png`` and ``.svg``, ``tuned_2.png`` and so on.
+
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
+        ParameterError
+            A feedforward is none that a file can hold.
+        """
+        names = ("controller",) if len(self.controllers) == 1 else ("controller_x", "controller_y")
+        with result_set(make_folder(folder)) as path:
+            pictures = {picture_name(i): run.plot() for i, run in enumerate(self.runs)}
+            return [
+                write_document(path / "tuning.json", self.document()),
+                *(
+                    one.save(path / f"{name}.json", report=self)
+                    for name, one in zip(names, self.controllers, strict=True)
+                ),
+                *save_figures(pictures, path),
+            ]
 
 
-class TunedPair(NamedTuple):
-    """The tuned controllers of an XY stage and the report of their search.
-
-    Attributes
-    ----------
-    controllers : (Controller, Controller)
-        Of x and y, for `contour`.
-    report : TuningReport
-        Their margins and active constraints.
-    """
-
-    controllers: tuple[Controller, Controller]
-    report: TuningReport
-
-    def __str__(self) -> str:
-        x, y = (parts_text(one).replace("\n", "; ") for one in self.controllers)
-        return f"x: {x}\ny: {y}\n{self.report}"
+def motion_of(run: Tracking | Contour) -> Reference | XYReference:
+    """Return the reference or the path of a run."""
+    return run.path if isinstance(run, Contour) else run.reference
 
 
-def _run_lines(run: Tracking | Contour) -> list[str]:
-    if isinstance(run, Contour):
-        return [f"{run.path!r}: contour error {run.metrics}"]
-    return [f"{run.reference!r}: {run.metrics}"]
+def picture_name(i: int) -> str:
+    """Name the picture of the loop along a reference."""
+    return "tuned" if i == 0 else f"tuned_{i + 1}"
 
 
-def parts_text(controller: Controller) -> str:
-    """Write the gains of a controller with their units."""
-    unit, scale = shown_unit(controller.drive_unit)
-    text = []
-    law = controller.feedback
-    if law is not None and law.info.name == "pid":
-        pid = law._pid
-        text.append(
-            f"PID: kp {1e-6 * scale * pid.kp:.4g} {unit}/um, ti {1e3 * pid.ti:.4g} ms, "
-            f"td {1e3 * pid.td:.4g} ms"
-        )
-    elif law is not None:
-        text.append(repr(law))
-    text += [_filter_text(one) for one in controller.filters]
-    if controller.repetitive is not None:
-        text.append(_repetitive_text(controller.repetitive, unit, scale))
-    return "\n".join(text) or "no feedback"
-
-
-def _filter_text(one: Filter) -> str:
-    values = one._values
-    if one.info.name == "low-pass":
-        return f"low-pass: {values['cutoff']:.4g} Hz"
-    frequency, width, depth = (values[name] for name in ("frequency", "width", "depth"))
-    return f"notch: {frequency:.4g} Hz, width {width:.3g}, depth {depth:.3g}"
-
-
-def _repetitive_text(part: Repetitive, unit: str, scale: float) -> str:
-    return (
-        f"repetitive: kq {1e-6 * scale * part.kq:.3g} {unit}/um, {part.smoothing}, "
-        f"lead {part.lead} samples, forgetting factor {part.forgetting_factor:.4g}"
-    )
+def _settings(controller: Controller) -> dict[str, Any]:
+    """Return the settings of a controller for the JSON file."""
+    law, learner = controller.feedback, controller.repetitive
+    return {
+        "dt": {"value": controller.dt, "unit": "s"},
+        "limits": {"value": list(controller.limits), "unit": controller.drive_unit},
+        "feedback": None if law is None else asdict(law),
+        "filters": [{"kind": type(one).__name__, **asdict(one)} for one in controller.filters],
+        "repetitive": None if learner is None else asdict(learner),
+    }

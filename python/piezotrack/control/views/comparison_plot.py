@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._support.plot_style import panels, whole
+from ..._support.display.plot_style import panels, whole
 from .comparison_table import short
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import re
 from textwrap import wrap
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..._support.table import words
+from ..._support.display.table import words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

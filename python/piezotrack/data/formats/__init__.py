@@ -1,16 +1,17 @@
 """The formats of logs, one file each.
 
-A format is a file here with a `Format`, and a line in the list. Its `opens` says which columns a
-file has, with the units and the sampling interval that the file states; which column is what, and
-what units mean, is decided in `data/columns.py` for all of them.
+A format is a file in `text` or `binary` with a `Format`, and a line in the list. Its `opens` says
+which columns a file has, with the units and the sampling interval that the file states; which
+column is what, and what units mean, is decided in `data/columns.py` for all of them.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from . import afm, gcs, hdf5, lvm, mat, mdf, npz, parquet, tdms, text, waveforms
+from .binary import afm, hdf5, mat, mdf, npz, parquet, tdms
 from .source import Source
+from .text import delimited, gcs, lvm, waveforms
 
 if TYPE_CHECKING:
     import os
@@ -32,7 +33,7 @@ FORMATS: tuple[Format, ...] = (
     gcs.FORMAT,
     lvm.FORMAT,
     waveforms.FORMAT,
-    text.FORMAT,
+    delimited.FORMAT,
 )
 
 
@@ -44,7 +45,7 @@ def format_of(source: Source) -> Format:
     for known in FORMATS:
         if source.ending in known.endings:
             return known
-    return text.FORMAT
+    return delimited.FORMAT
 
 
 def open_log(path: str | os.PathLike[str]) -> Table:

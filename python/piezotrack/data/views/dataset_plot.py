@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..._support.plot_style import (
+from ..._support.display.plot_style import (
     COMMAND,
     RECORDED,
     few_ticks,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..._support.table import words
+from ..._support.display.table import words
 from ..._support.units import best_length_unit
 
 if TYPE_CHECKING:

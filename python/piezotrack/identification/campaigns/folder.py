@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.files import json_ready, make_folder, write_document
-from ..._support.json_text import parse_json
+from ..._support.files.json_text import parse_json
+from ..._support.files.writing import json_ready, make_folder, write_document
 from ..._support.messages import listed, quoted
 from ...errors import DataError, ParameterError
 from ..fitted.model_entries import FORMAT as MODEL

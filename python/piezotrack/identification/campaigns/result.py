@@ -8,9 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, overload
 
-from ..._support.files import replacing
-from ..._support.frames import frame_of
-from ..._support.result import Result
+from ..._support.display.frames import frame_of
+from ..._support.display.result import Result
+from ..._support.files.writing import replacing
 from ...errors import DataError, ParameterError
 from ..fitted.model_file import load
 from .task import FAILURE

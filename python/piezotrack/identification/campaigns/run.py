@@ -11,7 +11,7 @@ from queue import Empty, SimpleQueue
 from threading import Event
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..._support.progress_bar import ProgressBar
+from ..._support.display.progress_bar import ProgressBar
 from ...errors import ExecutorError, Interrupted, PiezotrackError
 from .task import FAILURE, Task, run_task
 

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ... import _core
 from ..._support.arguments import expect, has_entries, one_of
-from ..._support.files import (
+from ..._support.display.result import Result
+from ..._support.files.writing import (
     make_folder,
     picture_files,
     result_set,
     save_figures,
     write_document,
 )
-from ..._support.result import Result
 from ...data.dataset import Dataset
 from ...errors import ParameterError
 from ...stages.registry import MODELS, ModelInfo, model_named

@@ -11,8 +11,8 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import expect
 from ..._support.arrays import real_array
-from ..._support.files import make_folder, result_set, save_figures, write_document
-from ..._support.result import Result
+from ..._support.display.result import Result
+from ..._support.files.writing import make_folder, result_set, save_figures, write_document
 from ..._support.statistics import ErrorStatistics
 from ...data.dataset import Dataset
 from ...errors import DataError, ParameterError

@@ -8,12 +8,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ... import _core
-from ..._support.files import make_folder, result_set, save_figures, write_document
+from ..._support.display.result import Result
+from ..._support.files.writing import make_folder, result_set, save_figures, write_document
 from ..._support.messages import quoted
-from ..._support.result import Result
 from ...data.dataset import Dataset
 from ...errors import ParameterError
-from ...stages.dahl import DahlStage
+from ...stages.feedback.dahl import DahlStage
 from .step_readings import StepReadings
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import positive
 from ..._support.arrays import LARGEST, SHORTEST
-from ..._support.json_text import object_of
+from ..._support.files.json_text import object_of
 from ...errors import ParameterError
 
 if TYPE_CHECKING:

@@ -1,10 +1,17 @@
-"""Parts of a result: progress of a search, estimates of parameters, restarts of the swarm."""
+"""Parts of a result: estimates of parameters, progress and course of a search."""
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-__all__ = ["Constraint", "Estimate", "LagRange", "Progress", "StopReason", "SwarmRun"]
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["Constraint", "Estimate", "LagRange", "Progress", "SearchRun", "StopReason", "SwarmRun"]
 
 # Share of a prior's width from which on a standard deviation is the prior's.
 OF_PRIOR = 0.9
@@ -156,3 +163,53 @@ class SwarmRun(NamedTuple):
     nit: int
     nfev: int
     stop_reason: StopReason
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SearchRun:
+    """Course of the search that identified a model.
+
+    Attributes
+    ----------
+    runs : tuple of SwarmRun
+        The independent restarts of a swarm, or the descents; `history` and `nit` are those of the
+        best one.
+    agreeing_runs : int
+        Number of runs that ended within 0.1 % of the lowest cost; of descents before the local
+        refinement of the best one. Costs below 0.001 % of the stroke count as equal.
+    history : ndarray, shape (nit + 1,)
+        Best cost after each iteration of the best run [m], with the priors where there are any.
+    nit : int
+        Iterations of the swarm, or of the descent, that found the best candidate.
+    nfail : int
+        Simulations that diverged.
+    npolish : int
+        Simulations of the local refinement after that run, which `history` does not include.
+    substeps, order : int
+        Steps of the integrator in each sampling interval and their order, fixed for the search.
+    scales : dict of str to str
+        The scales that were given.
+    cost_with_priors : float or None
+        What was minimised where there were priors [m]: the cost times the factor of the priors,
+        see `identify`.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> log = pt.datasets.dbo_training()[3.0:5.0]
+    >>> few = pt.ParticleSwarm(iterations=3, runs=2, seed=1)
+    >>> search = pt.identify(log, "dahl", method=few, progress=False).search
+    >>> search.nit, search.history.shape, len(search.runs)
+    (3, (4,), 2)
+    """
+
+    runs: tuple[SwarmRun, ...]
+    agreeing_runs: int
+    history: NDArray[np.float64]
+    nit: int
+    nfail: int
+    npolish: int
+    substeps: int
+    order: int
+    scales: Mapping[str, str]
+    cost_with_priors: float | None

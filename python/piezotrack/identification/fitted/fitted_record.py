@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.json_text import object_of
+from ..._support.files.json_text import object_of
 from ...errors import ParameterError
 from .drift import Drift, drift_entry, drift_of
 from .start import Start, same_beginning, start_entry, start_of

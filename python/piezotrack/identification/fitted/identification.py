@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from ...data.dataset import Dataset
     from ...stages.motion import Response
     from ..methods.least_squares import LeastSquares
-    from .estimates import Constraint, Estimate, LagRange, StopReason, SwarmRun
+    from .estimates import Constraint, Estimate, LagRange, SearchRun, StopReason
     from .score import Score
-    from .trial import Trial
+    from .selection import Selection
 
     Array = NDArray[np.float64]
 
@@ -41,9 +41,6 @@ OTHER = 1.5
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Identification(IdentifiedModel):
     """Result of an identification; see `IdentifiedModel` for its use.
-
-    After a fit by least squares `at_bound`, `lags` and the first five attributes are set; after a
-    search all but `at_bound`.
 
     Attributes
     ----------
@@ -66,36 +63,14 @@ class Identification(IdentifiedModel):
         was fitted. Empty after least squares.
     constraints : tuple of Constraint
         The inequalities that were given, each with whether it decides the result.
-    scales : dict of str to str
-        The scales that were given.
-    cost_with_priors : float or None
-        What was minimised where there were priors [m]: `cost` times the factor of the priors, see
-        `identify`. `history` and the costs of `runs` have it too.
-    history : ndarray, shape (nit + 1,)
-        Best cost after each iteration of the best run [m].
-    nit : int
-        Iterations of the swarm, or of the descent, that found the best candidate.
-    nfail : int
-        Simulations that diverged.
-    npolish : int
-        Simulations of the local refinement after that run, which `history` does not include.
-    runs : tuple of SwarmRun
-        The independent restarts of a swarm, or the descents; the other attributes are those of
-        the best one.
-    substeps, order : int
-        Steps of the integrator in each sampling interval and their order, fixed for the search.
-    agreeing : int
-        Number of runs that ended within 0.1 % of the lowest cost; of descents before the local
-        refinement of the best one. Costs below 0.001 % of the stroke count as equal.
+    search : SearchRun or None
+        Course of the search; None after least squares.
     lags : LagRange or None
         Lags that fit as well, where the drive is too slow to tell them from hysteresis and creep.
-    trials : tuple of Trial
-        The kinds that were tried, the best first, where ``model="auto"`` chose one of them.
-    fitted_until : float or None
-        End of the part of the window that these were fitted to [s]; they were judged on the rest.
-        None where the window is too short for two parts.
+    selection : Selection or None
+        The choice between models; None without ``model="auto"``.
     at_bound : bool
-        Whether a time constant or a frequency lies on a bound of its range.
+        Whether least squares left a time constant or a frequency on a bound of its range.
     """
 
     views: ClassVar[Mapping[str, str]] = {
@@ -112,19 +87,9 @@ class Identification(IdentifiedModel):
     method: Descents | ParticleSwarm | LeastSquares
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     constraints: tuple[Constraint, ...] = ()
-    scales: Mapping[str, str] = field(default_factory=dict)
-    cost_with_priors: float | None = None
-    history: Array = field(default_factory=lambda: np.empty(0))
-    nit: int = 0
-    nfail: int = 0
-    npolish: int = 0
-    runs: tuple[SwarmRun, ...] = ()
-    substeps: int = 1
-    order: int = 0
-    agreeing: int = 0
+    search: SearchRun | None = None
     lags: LagRange | None = None
-    trials: tuple[Trial, ...] = ()
-    fitted_until: float | None = None
+    selection: Selection | None = None
     at_bound: bool = False
 
     def __post_init__(self) -> None:
@@ -209,7 +174,7 @@ class Identification(IdentifiedModel):
             notes.append(
                 "the record does not determine the dynamics: time constant or mode lies on a bound"
             )
-        if len(self.runs) > 1 and self.agreeing == 1:
+        if self.search and len(self.search.runs) > 1 and self.search.agreeing_runs == 1:
             what = "restart" if isinstance(self.method, ParticleSwarm) else "descent"
             notes.append(f"no other {what} ended in the minimum of the best one: increase runs=")
         return notes
@@ -229,7 +194,7 @@ class Identification(IdentifiedModel):
             )
         notes += drift_notes(one.drift, one.stroke)
         notes += self.model._notes(lambda: run)
-        if self.trials:
+        if self.selection:
             # A mode moves from sample to sample as noise does; what is left of it hardly does.
             notes += above_noise(one.cost, min(sample_noise(data.y), sample_noise(rest)))
         return notes + first_samples(rest, data)

@@ -10,8 +10,8 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import expect
 from ..._support.arrays import LARGEST, check_dt, signal_of
-from ..._support.files import write_document
-from ..._support.result import Result
+from ..._support.display.result import Result
+from ..._support.files.writing import write_document
 from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
 from .delayed_reading import delayed_reading

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
     from ...data.dataset import Dataset
-    from ...stages.base import Stage
+    from ...stages.inverse import InvertibleStage
     from ...stages.model_info import ModelInfo
     from .estimates import Constraint
 
@@ -41,7 +41,7 @@ SENSOR: dict[str, tuple[str, Callable[[float], bool], str]] = {
 }
 
 
-def parameter_entries(stage: Stage, drive: str) -> dict[str, dict[str, Any]]:
+def parameter_entries(stage: InvertibleStage, drive: str) -> dict[str, dict[str, Any]]:
     """Entries of a file on the parameters of a stage.
 
     Parameters

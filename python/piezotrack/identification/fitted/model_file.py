@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.json_text import number_pair, object_of, parse_json, text_of
+from ..._support.files.json_text import number_pair, object_of, parse_json, text_of
 from ..._support.units import of_drive
 from ...errors import DataError, ParameterError, PiezotrackError
 from ...stages.registry import model_named, stage_class

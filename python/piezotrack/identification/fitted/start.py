@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import _core
 from ..._support.arguments import as_numbers
-from ..._support.json_text import object_of, text_of
+from ..._support.files.json_text import object_of, text_of
 from ..._support.messages import quoted
 from ...errors import ParameterError
 

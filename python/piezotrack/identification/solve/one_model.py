@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..._support.progress_bar import ProgressBar
+from ..._support.display.progress_bar import ProgressBar
 from ...errors import Interrupted
 from ..fitted.start import GAIN
 from ..methods.least_squares import LeastSquares

@@ -6,12 +6,12 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.progress_bar import ProgressBar
+from ..._support.display.progress_bar import ProgressBar
 from ..._support.units import of_drive
 from ...errors import Interrupted
 from ...stages.registry import stage_class
 from ..fitted.drift import Drift
-from ..fitted.estimates import Constraint, Estimate, LagRange, Progress, SwarmRun
+from ..fitted.estimates import Constraint, Estimate, LagRange, Progress, SearchRun, SwarmRun
 from ..fitted.fitted_record import FittedRecord
 from ..fitted.identification import Identification
 from ..fitted.model_entries import constraint_entries, fit_entry, origin_of, provenance
@@ -151,20 +151,22 @@ def _identification(
         data=data,
         parameters=parameters,
         constraints=constraints,
-        scales={name: one.scale for name, one in problem.parameters.items() if one.scale},
         cost=found.rms,
-        cost_with_priors=found.rms_with_priors,
-        history=found.history,
-        nit=found.iterations,
         nfev=sum(nfev for _, _, nfev, _ in found.runs),
-        nfail=found.failures,
-        npolish=found.polish_evaluations,
         stop_reason=found.stop_reason,
-        runs=tuple(SwarmRun(*run) for run in found.runs),
-        substeps=found.substeps,
-        order=found.order,
-        agreeing=found.agreeing,
         method=method,
+        search=SearchRun(
+            runs=tuple(SwarmRun(*run) for run in found.runs),
+            agreeing_runs=found.agreeing,
+            history=found.history,
+            nit=found.iterations,
+            nfail=found.failures,
+            npolish=found.polish_evaluations,
+            substeps=found.substeps,
+            order=found.order,
+            scales={name: one.scale for name, one in problem.parameters.items() if one.scale},
+            cost_with_priors=found.rms_with_priors,
+        ),
     )
 
 

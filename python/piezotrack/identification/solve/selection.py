@@ -12,7 +12,7 @@ from ... import _core
 from ..._support.statistics import sample_noise
 from ...errors import DataError, NumericalError
 from ...stages.registry import model_named
-from ..fitted.trial import Trial
+from ..fitted.selection import Selection, Trial
 from .one_model import identify_model
 
 if TYPE_CHECKING:
@@ -198,7 +198,8 @@ def with_trials(
     trials = tuple(sorted((one for one, _ in found), key=lambda one: one.rms))
     models = {one.model: {"rms": one.rms, "unit": "m"} for one in trials}
     details = {"selection": {"fitted_until_s": until, "models": models}}
-    return replace(fit, trials=trials, fitted_until=until, details={**fit.details, **details})
+    selection = Selection(trials=trials, fitted_until=until)
+    return replace(fit, selection=selection, details={**fit.details, **details})
 
 
 def models_tried(data: Dataset, parameters: Mapping[str, object]) -> list[ModelInfo]:

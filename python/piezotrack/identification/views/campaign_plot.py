@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..._support.plot_style import GUIDE, MODELS, few_ticks, folded, heading, literal, panels, whole
+from ..._support.display.plot_style import (
+    GUIDE,
+    MODELS,
+    few_ticks,
+    folded,
+    heading,
+    literal,
+    panels,
+    whole,
+)
 from ..campaigns.result import size_of
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from statistics import median
 from typing import TYPE_CHECKING
 
-from ..._support.table import Column, Table, words
+from ..._support.display.table import Column, Table, words
 from ..campaigns.result import size_of
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..._support.plot_style import (
+from ..._support.display.plot_style import (
     GUIDE,
     MEASURED,
     MODELS,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..._support.table import Column, Table
+from ..._support.display.table import Column, Table
 
 if TYPE_CHECKING:
     from ...data.dataset import Dataset

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..._support.table import words
+from ..._support.display.table import words
 from .report import parameter_notes
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..._support.arguments import expect, finite, positive
-from ..._support.plot_style import (
+from ..._support.display.plot_style import (
     ERROR,
     GUIDE,
     MARKS,
@@ -191,36 +191,37 @@ def plot_convergence(
     ParameterError
         The model was not searched.
     """
-    if not fit.history.size:
+    search = fit.search
+    if search is None:
         raise ParameterError("the model was fitted by least squares: expected one of a search")
     (ax,) = axes_or_new(ax, 1)
     # A cost of 0 has no place on a logarithmic scale.
-    shown = np.isfinite(fit.history) & (fit.history > 0.0)
-    iterations = np.arange(fit.history.size)[shown]
+    shown = np.isfinite(search.history) & (search.history > 0.0)
+    iterations = np.arange(search.history.size)[shown]
     one = "swarm" if isinstance(fit.method, ParticleSwarm) else "descent"
-    best = f"best of {len(fit.runs)} {one}s" if len(fit.runs) > 1 else one
+    best = f"best of {len(search.runs)} {one}s" if len(search.runs) > 1 else one
     ax.plot(
         iterations,
-        1e6 * fit.history[shown],
+        1e6 * search.history[shown],
         color=SIMULATED["color"],
         linewidth=1.4,
-        label=f"{best}: {1e6 * fit.history[-1]:.4g} um",
+        label=f"{best}: {1e6 * search.history[-1]:.4g} um",
     )
-    ends = [(run.nit, 1e6 * run.cost) for run in fit.runs if 0.0 < run.cost < np.inf]
+    ends = [(run.nit, 1e6 * run.cost) for run in search.runs if 0.0 < run.cost < np.inf]
     if len(ends) > 1:
-        refined = fit.npolish and one == "swarm"
+        refined = search.npolish and one == "swarm"
         label = f"each {one}, refined" if refined else f"end of each {one}"
         ax.plot(*zip(*ends, strict=True), **{**MARKS, "marker": "x", "label": label})
-    if fit.npolish and fit.cost > 0.0:
-        least = fit.cost_um if fit.cost_with_priors is None else 1e6 * fit.cost_with_priors
-        ax.plot(fit.nit, least, **{**MARKS, "label": f"refined: {least:.4g} um"})
+    if search.npolish and fit.cost > 0.0:
+        least = fit.cost_um if search.cost_with_priors is None else 1e6 * search.cost_with_priors
+        ax.plot(search.nit, least, **{**MARKS, "label": f"refined: {least:.4g} um"})
     if shown.any():
         ax.set_yscale("log")
     ax.set(xlabel="iteration", ylabel="best cost, rms [um]")
     ax.margins(x=0.02)
     heading(
         ax,
-        f"{title}: {fit.nit} iterations, {fit.nfev} simulations",
+        f"{title}: {search.nit} iterations, {fit.nfev} simulations",
     )
     legend_inside(ax, ncols=2)
     if shown.any():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..._support.files import make_folder, picture_files, result_set, save_figures
+from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
 from ..._support.units import of_drive, shown_unit
 from ..fitted.notes import start_notes
 from ..methods.descents import Descents
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from ...data.dataset import Dataset
     from ...stages.model_info import Parameter
-    from ..fitted.estimates import Estimate
+    from ..fitted.estimates import Estimate, SearchRun
     from ..fitted.identification import Identification
     from ..fitted.identified_model import IdentifiedModel
 
@@ -49,15 +49,18 @@ def summary_text(fit: Identification) -> str:
         Several lines.
     """
     lines = _of_several(fit) if len(fit.records) > 1 else _of_one(fit)
-    if fit.cost_with_priors is not None:
-        lines.append(f"      {1e6 * fit.cost_with_priors:.4g} um with the priors was minimised")
     searched, method = fit.model.info.searched, fit.method
-    if not isinstance(method, LeastSquares):
-        iterations = f"{fit.nit} iterations, " if isinstance(method, ParticleSwarm) else ""
-        how = f"{iterations}{fit.nfev} simulations, seed {method.seed}: {fit.message}"
-        lines += [f"      {how}", *_runs(fit)]
-    else:
+    if isinstance(method, LeastSquares) or fit.search is None:
         lines.append(f"      least squares, {fit.nfev} simulations")
+    else:
+        search = fit.search
+        if search.cost_with_priors is not None:
+            lines.append(
+                f"      {1e6 * search.cost_with_priors:.4g} um with the priors was minimised"
+            )
+        iterations = f"{search.nit} iterations, " if isinstance(method, ParticleSwarm) else ""
+        how = f"{iterations}{fit.nfev} simulations, seed {method.seed}: {fit.message}"
+        lines += [f"      {how}", *_runs(search, method)]
     lines += _trials(fit)
     lines += [*(f"note  {note}" for note in fit.notes), ""]
     return "\n".join(
@@ -153,13 +156,14 @@ def _size(data: Dataset) -> str:
 
 def _trials(fit: Identification) -> list[str]:
     """Say which kinds were tried, and on what they were judged."""
-    if not fit.trials:
+    chosen = fit.selection
+    if chosen is None:
         return []
-    scores = ", ".join(f"{one.title} {100 * one.rms / fit.stroke:.3g} %" for one in fit.trials)
+    scores = ", ".join(f"{one.title} {100 * one.rms / fit.stroke:.3g} %" for one in chosen.trials)
     where = (
         "on the part fitted, as the window is too short for another"
-        if fit.fitted_until is None
-        else f"after {fit.fitted_until:.4g} s, fitted before that"
+        if chosen.fitted_until is None
+        else f"after {chosen.fitted_until:.4g} s, fitted before that"
     )
     return [f"      chosen by the rms {where}: {scores}"]
 
@@ -185,8 +189,8 @@ def _estimates(fit: Identification) -> list[str]:
         lines += ["", f"Not determined by {which}: " + ", ".join(unclear) + "."]
     if known := [n for n, e in fit.parameters.items() if e.from_prior]:
         lines += ["", f"Known by their priors, not by {which}: " + ", ".join(known) + "."]
-    if fit.nfail:
-        lines += ["", f"{fit.nfail} simulations diverged; their cost counted as infinite."]
+    if fit.search and fit.search.nfail:
+        lines += ["", f"{fit.search.nfail} simulations diverged; their cost counted as infinite."]
     return lines
 
 
@@ -228,12 +232,14 @@ def _scaled(fit: IdentifiedModel, one: Parameter) -> list[float]:
     return [scale * number for number in getattr(fit.model, one.name)]
 
 
-def _runs(fit: Identification) -> list[str]:
+def _runs(search: SearchRun, method: Descents | ParticleSwarm) -> list[str]:
     """Say whether several runs agree, and what the others found."""
-    costs = sorted(1e6 * run.cost for run in fit.runs)
-    if isinstance(fit.method, Descents):
-        text = f"{fit.agreeing} of {len(costs)} descents end within 0.1 % of the lowest cost"
-        others = costs[fit.agreeing :]
+    costs = sorted(1e6 * run.cost for run in search.runs)
+    if isinstance(method, Descents):
+        text = (
+            f"{search.agreeing_runs} of {len(costs)} descents end within 0.1 % of the lowest cost"
+        )
+        others = costs[search.agreeing_runs :]
         if others and others[0] < math.inf:
             most = max(cost for cost in others if cost < math.inf)
             text += f", the others at {others[0]:.4g} to {most:.4g} um"
@@ -241,7 +247,7 @@ def _runs(fit: Identification) -> list[str]:
     if len(costs) == 1:
         return ["      one run: runs=4 would show whether there are other local minima"]
     more = ", ..." if len(costs) > 4 else ""
-    verdict = f"{fit.agreeing} of {len(costs)} runs end within 0.1 % of the best"
+    verdict = f"{search.agreeing_runs} of {len(costs)} runs end within 0.1 % of the best"
     return [f"      {verdict}: {', '.join(f'{cost:.4g}' for cost in costs[:4])}{more} um"]
 
 
@@ -309,8 +315,8 @@ def parameter_notes(fit: Identification, name: str) -> str:
     if estimate.at_bound:
         on = any(one.active and name in (one.lower, one.upper) for one in fit.constraints)
         said.append("on a constraint" if on else "on a bound")
-    if name in fit.scales:
-        said.append(f"{fit.scales[name]} scale")
+    if fit.search and name in fit.search.scales:
+        said.append(f"{fit.search.scales[name]} scale")
     if estimate.tie is not None:
         said.append(f"tied: {estimate.tie}")
     if estimate.prior is not None:

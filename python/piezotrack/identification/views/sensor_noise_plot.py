@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._support.plot_style import (
+from ..._support.display.plot_style import (
     RECORDED,
     SIMULATED,
     heading,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..._support.arguments import expect
-from ..._support.plot_style import (
+from ..._support.display.plot_style import (
     LEVEL,
     MARKS,
     RECORDED,

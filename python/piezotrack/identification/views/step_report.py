@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..._support.table import Column, Table
+from ..._support.display.table import Column, Table
 from ..._support.units import drive_text, of_drive, shown_unit
 
 if TYPE_CHECKING:

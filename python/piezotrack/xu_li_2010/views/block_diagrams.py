@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..._support.plot_style import heading, panels, whole
+from ..._support.display.plot_style import heading, panels, whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,16 +6,24 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..._support.plot_style import GUIDE, MARKS, MEASURED, MODELS, heading, legend_inside, whole
-from ..._support.plot_style import panels as sheet
-from ..references import RULES
+from ..._support.display.plot_style import (
+    GUIDE,
+    MARKS,
+    MEASURED,
+    MODELS,
+    heading,
+    legend_inside,
+    whole,
+)
+from ..._support.display.plot_style import panels as sheet
+from ..experiments.references import RULES
 from . import block_diagrams
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
     from ...identification.fitted.identification import Identification
-    from ..fig_12_14_tracking import Runs
+    from ..experiments.fig_12_14_tracking import Runs
     from ..measured_log import Drives
     from ..reproduction import Reproduction
     from ..run import Experiments

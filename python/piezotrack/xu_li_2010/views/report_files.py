@@ -6,8 +6,8 @@ from itertools import pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from ..._support.files import make_folder, replacing, result_set, write_document
-from ..._support.plot_style import without_glyph_warnings
+from ..._support.display.plot_style import without_glyph_warnings
+from ..._support.files.writing import make_folder, replacing, result_set, write_document
 from ..reproduction import REPORT
 from .figures import Drawn, drawn
 from .report_html import html_text

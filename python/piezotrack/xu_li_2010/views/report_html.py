@@ -8,8 +8,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from ..apparatus import calibration_file
+from ..experiments.references import RULES
 from ..published import observables
-from ..references import RULES
 from .report_text import number, place, reading, seen, tally
 
 if TYPE_CHECKING:

@@ -6,16 +6,16 @@ import math
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from ..._support.table import Column, Table
+from ..._support.display.table import Column, Table
 from ..published import SI
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from ..experiments.table_2 import Table2
     from ..published import Obtained
     from ..reproduction import Reproduction
     from ..section import Section
-    from ..table_2 import Table2
 
 __all__ = ["number", "place", "reading", "seen", "summary_text", "table_2_text", "tally"]
 

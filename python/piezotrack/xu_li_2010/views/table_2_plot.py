@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._support.plot_style import (
+from ..._support.display.plot_style import (
     ACTUAL,
     ERROR,
     GUIDE,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
     from ...control.loop.contouring import Contour
-    from ..table_2 import Table2
+    from ..experiments.table_2 import Table2
 
 __all__ = ["plot_table_2"]
 

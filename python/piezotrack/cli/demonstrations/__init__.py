@@ -1,0 +1,1 @@
+"""Commands that show the package at work: the demonstration, and the paper."""

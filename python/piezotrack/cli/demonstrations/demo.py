@@ -1,0 +1,152 @@
+"""``piezotrack demo``: from a measured log to a tracked reference, with the logs of the package."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ..error_messages import report_errors
+from ..options import Json, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
+from ..output import Output
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ...control.loop.tracking import Tracking
+
+__all__ = ["demo_command"]
+
+UNIT = "errors in m, phase lag in rad, widest loop as a part of the travel"
+# Of the measured logs, and of the paper.
+PICTURES = ("other_loop", "other_time", "before_and_after")
+RUNS = {"feedforward": "feedforward alone", "pid": "PID alone", "all": "both, repetitive"}
+
+
+@report_errors
+def demo_command(
+    out: Out = Path("demo"),
+    overwrite: Overwrite = False,
+    paper: Annotated[
+        bool,
+        typer.Option("--paper", help="The simulated stage of Xu and Li 2010 and its Dahl model."),
+    ] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the search and of simulated noise.")] = 1,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Identify a measured log, test on another, track."""
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    (_paper if paper else _measured)(result, seed)
+
+
+def _measured(result: Output, seed: int) -> None:
+    """Run the demonstration on the two measured logs of the package."""
+    from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
+    from ...data.log_file import write_log
+    from ...identification.views.plot import plot_loop, plot_time, what_was_shown
+    from ...identification.views.report import identification_files, save_identification
+    from .demonstration import run_demo
+    from .loop_plot import plot_before_and_after
+
+    # The logs are known, and so is the kind of model that suits them.
+    model = identification_files("prandtl-ishlinskii", searched=False)
+    result.will_write(["log.csv", "other.csv", *model, *picture_files(*PICTURES)])
+    found = run_demo(seed, progress=result.progress)
+    fit, other = found.fit, found.other
+    run = fit.simulate(other)
+    title = what_was_shown(fit, other, run)
+    figures = (
+        plot_loop(other, run, title=title).figure,
+        plot_time(other, run, stroke=fit.stroke, title=title)[0].figure,
+        plot_before_and_after(found.runs),
+    )
+    with result_set(make_folder(result.out)) as folder:
+        written = [
+            write_log(found.log, folder / "log.csv"),
+            write_log(other.full, folder / "other.csv"),
+        ]
+        written += save_identification(fit, folder)
+        written += save_figures(dict(zip(PICTURES, figures, strict=True)), folder)  # type: ignore[arg-type]
+    words = [
+        "Two measured logs of a piezo stack: 0 to 3.6 V, 45 um, 1 Hz, sampled at 200 Hz",
+        "(Aye and Ang 2018). The model is fitted to 20 s of the first.",
+        "",
+        # The head of the summary: the values of the parameters are in the model file.
+        fit.summary().partition("\n\n")[0],
+        "",
+        f"on the other log, not fitted: {found.score}",
+        "",
+        "Tracking of a 1 Hz triangle from 5 to 42 um with this model, simulated on a stage",
+        "identified from the other log:",
+        *_runs({name: name for name in found.runs}, found.runs),
+        "",
+        "The same by hand, and more:",
+        *(f"  piezotrack {line}" for line in _commands(result.out)),
+    ]
+    document = {
+        "model": {**fit.document(), "notes": fit.notes},
+        "validation": asdict(found.score),
+        "tracking": {name: asdict(one.metrics) for name, one in found.runs.items()},
+        "unit": UNIT,
+    }
+    result.show("\n".join(words), document, written)
+
+
+def _commands(out: Path) -> list[str]:
+    """Return what to type next."""
+    from .demonstration import FEEDBACK, NOISE, REFERENCE, WINDOW
+
+    log, other, model = (out / name for name in ("log.csv", "other.csv", "prandtl-ishlinskii.json"))
+    window = "{:g}:{:g}".format(*WINDOW)
+    return [
+        f"identify {log} --window {window} --validate {other} --validate-window 3:",
+        f"compare {log} --train {window}",
+        f"track {model} --reference {REFERENCE} \\\n"
+        f"      --kp {1e-6 * FEEDBACK.kp:g} --ti {FEEDBACK.ti:g} --noise-nm {1e9 * NOISE:g}",
+        f"feedforward {model} {REFERENCE}",
+    ]
+
+
+def _paper(result: Output, seed: int) -> None:
+    """Run the demonstration of the paper: its stage, simulated, and its model."""
+    from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
+    from ...data.log_file import write_log
+    from ...identification.views.report import identification_files, save_identification
+    from ...xu_li_2010.demo import demo_log, identify_demo, track_demo
+
+    tracked = picture_files(*(f"track_{name}" for name in RUNS))
+    result.will_write(["log.csv", *identification_files("dahl", searched=True), *tracked])
+    log = demo_log(seed)
+    fit = identify_demo(log, seed=seed, progress=result.progress)
+    rest = fit.score(log.full[fit.data.t[-1] :], offset=fit.offset)
+    runs = track_demo(fit, seed)
+    with result_set(make_folder(result.out)) as folder:
+        written = [write_log(log, folder / "log.csv")]
+        written += save_identification(fit, folder, shown=log)
+        written += save_figures({f"track_{name}": run.plot() for name, run in runs.items()}, folder)
+    words = [
+        "A virtual stage that no model matches exactly is driven for 12 s at 0.25 Hz, 0 to 75 V.",
+        "Mass, damping, stiffness and piezo coefficient are identified from the first 4 s;",
+        "the hysteresis parameters are held fixed, which sets the scale of the forces.",
+        "",
+        fit.summary(),
+        "",
+        f"validation on the other 8 s: {rest}",
+        "",
+        "Tracking of a 0.2 Hz sine over 110 um, sampled at 50 Hz:",
+        *_runs(RUNS, runs),
+    ]
+    document = {
+        "model": {**fit.document(), "notes": fit.notes},
+        "validation": {**asdict(rest), "fit_percent": rest.fit_percent},
+        "tracking": {name: asdict(run.metrics) for name, run in runs.items()},
+        "unit": UNIT,
+    }
+    result.show("\n".join(words), document, written)
+
+
+def _runs(names: Mapping[str, str], runs: Mapping[str, Tracking]) -> list[str]:
+    return [f"  {names[name]:<20} {run.metrics}" for name, run in runs.items()]

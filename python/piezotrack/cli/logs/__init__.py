@@ -1,0 +1,1 @@
+"""Commands on logs: what they hold, and other formats."""

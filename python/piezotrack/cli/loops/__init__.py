@@ -1,0 +1,1 @@
+"""Commands on controllers: tracking, contouring, learning, tuning, export."""

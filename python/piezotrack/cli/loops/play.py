@@ -1,0 +1,55 @@
+"""``piezotrack play``: a reference followed with a table that a device plays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..devices.connection import DeviceAddress, Rest, connected
+from ..error_messages import report_errors
+from ..options import Duration, Json, Out, Overwrite, Period, Quiet  # noqa: TC001, typer reads it
+from ..output import Output
+from .track import parsed_reference
+
+__all__ = ["play_command"]
+
+
+@report_errors
+def play_command(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="CONTROLLER",
+            help="Controller file in JSON with feedforward alone; with --rate a model file, whose "
+            "inverse is played.",
+        ),
+    ],
+    device: DeviceAddress,
+    reference: Annotated[str, typer.Option(metavar="TEXT|FILE", help="Reference, as of `track`.")],
+    out: Out = Path("results"),
+    overwrite: Overwrite = False,
+    rate: Annotated[
+        float | None,
+        typer.Option(help="Sampling rate of the inverse of a model in Hz.", show_default=False),
+    ] = None,
+    duration: Duration = None,
+    period: Period = None,
+    rest: Rest = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Play a feedforward as a table on a device."""
+    from ..._support.files.writing import picture_files
+    from ...control.controller.load import load_controller
+    from ...control.on_device.playing import play
+    from ...identification.fitted.model_file import load
+
+    forward = load_controller(file) if rate is None else load(file).inverse()
+    desired = parsed_reference(reference, duration, period)
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
+    with connected(device) as used:
+        run = play(used, forward, desired, rate=rate, rest=rest)
+    result.show(run.summary(), run.document(), run.save(out))

@@ -1,0 +1,1 @@
+"""Commands on models: their identification, comparison and simulation."""

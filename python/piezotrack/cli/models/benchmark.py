@@ -1,0 +1,172 @@
+"""``piezotrack benchmark``: models times records, each fitted by its default call."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ...errors import DataError, ParameterError
+from ..error_messages import report_errors
+from ..options import (
+    Columns,
+    DisplacementColumn,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Json,
+    Quiet,
+    Resample,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    of_file,
+    refuse_without_effect,
+    seconds,
+    windowed,
+)
+from ..output import Output
+
+if TYPE_CHECKING:
+    from ...benchmarking.record import BenchmarkRecord
+    from ...data.dataset import Dataset
+
+__all__ = ["benchmark_command"]
+
+# What a line of a list may say of its log.
+SAID = ("train", "test", "other", "other-test")
+
+
+@report_errors
+def benchmark_command(
+    context: typer.Context,
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[FILE]", help="Your own logs, in place of the package's records."),
+    ] = None,
+    listed: Annotated[
+        Path | None,
+        typer.Option(
+            "--list",
+            metavar="FILE",
+            help="List of your own logs: a line each, as `log.csv train=3:23 other=second.csv`.",
+        ),
+    ] = None,
+    record: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Record of the package; default all. Repeatable."),
+    ] = None,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="Model; default all that suit a record's drive. Repeatable."
+        ),
+    ] = None,
+    train: Annotated[
+        str | None,
+        typer.Option(metavar="A:B", help="Seconds of each FILE to fit; default the first half."),
+    ] = None,
+    test: Annotated[
+        str | None,
+        typer.Option(metavar="A:B", help="Seconds of each FILE to judge on; default the rest."),
+    ] = None,
+    out: Annotated[
+        Path,
+        typer.Option(
+            metavar="FOLDER", help="Folder for the results; what it has is not computed again."
+        ),
+    ] = Path("benchmark"),
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Compute again what the folder has.")
+    ] = False,
+    time: TimeColumn = None,
+    drive: DriveColumn = None,
+    displacement: DisplacementColumn = None,
+    unit: Units = None,
+    dt: Interval = None,
+    resample: Resample = None,
+    hold: HoldOption = "foh",
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compare all models on many records."""
+    from ...benchmarking.board import benchmark
+
+    if not files:
+        refuse_without_effect(context, ("train", "test"), "without a FILE")
+    if not files and listed is None:
+        columns = ("time", "drive", "displacement", "unit", "dt", "resample", "hold")
+        refuse_without_effect(context, columns, "without a FILE or --list")
+    result = Output(out, overwrite=True, json=json, quiet=quiet)
+    can_be_folder(out)
+    reading = Columns(time, drive, displacement, unit, dt)
+
+    def read(file: Path) -> Dataset:
+        return reading.read(file, hold, resample)
+
+    records: list[str | BenchmarkRecord] = list(record or [])
+    records += [_record(file, read(file), train, test, None) for file in files or []]
+    if listed is not None:
+        for file, said in _lines(listed):
+            other = None
+            if "other" in said:
+                path = listed.parent / said["other"]
+                other = windowed(read(path), path, "other-test", said.get("other-test"))
+            records.append(_record(file, read(file), said.get("train"), said.get("test"), other))
+    found = benchmark(
+        records or None, model or None, folder=out, overwrite=overwrite, progress=result.progress
+    )
+    written = found.save(out)
+    if all(one.error for one in found.results):
+        first = found.results[0]
+        raise DataError(f"no model was found of any record; {first.record}: {first.error}")
+    result.show(found.summary(), found.document(), written)
+
+
+def _record(
+    file: Path, log: Dataset, train: str | None, test: str | None, other: Dataset | None
+) -> BenchmarkRecord:
+    """Make the record of a log."""
+    from ...benchmarking.record import BenchmarkRecord
+
+    with of_file(file):
+        return BenchmarkRecord.of_log(
+            log,
+            train=None if train is None else seconds("--train", train),
+            test=None if test is None else seconds("--test", test),
+            other=other,
+        )
+
+
+def _lines(listed: Path) -> list[tuple[Path, dict[str, str]]]:
+    """Read a list of logs: each with what is fitted, what is judged, and another log."""
+    try:
+        text = listed.read_text(encoding="utf-8")
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise ParameterError(f"--list: {listed} cannot be read: {reason}") from None
+    except UnicodeDecodeError:
+        raise ParameterError(f"--list: {listed} is not a text file") from None
+    found = []
+    for number, line in enumerate(text.splitlines(), 1):
+        where = f"{listed}:{number}"
+        try:
+            words = shlex.split(line, comments=True)
+        except ValueError as error:
+            raise DataError(f"{where}: {str(error).lower()}") from None
+        if not words:
+            continue
+        said = dict(word.partition("=")[::2] for word in words[1:])
+        if len(said) < len(words) - 1 or not said.keys() <= set(SAID) or not all(said.values()):
+            raise DataError(
+                f"{where}: '{' '.join(words[1:])}': expected NAME=VALUE with the names "
+                f"{', '.join(SAID)}, each once at most"
+            )
+        if "other-test" in said and "other" not in said:
+            raise DataError(f"{where}: other-test has no effect without other=")
+        found.append((listed.parent / words[0], said))
+    if not found:
+        raise DataError(f"{listed}: no log is listed: expected one a line")
+    return found

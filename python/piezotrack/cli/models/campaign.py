@@ -1,0 +1,260 @@
+"""``piezotrack campaign``: many logs, kinds of model and seeds, with a file for each result."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ...errors import DataError, Interrupted, ParameterError
+from ..error_messages import report_errors
+from ..interruption import acknowledge_interrupt
+from ..options import (
+    Columns,
+    DisplacementColumn,
+    DriveColumn,
+    HoldOption,
+    Interval,
+    Json,
+    Quiet,
+    Resample,
+    Seconds,
+    TimeColumn,
+    Units,
+    can_be_folder,
+    refuse_without_effect,
+    windowed,
+)
+from ..output import Output
+from .fit_options import (
+    Asymmetry,
+    Bound,
+    Constrain,
+    Creep,
+    Delay,
+    Drift,
+    Dynamics,
+    FitOptions,
+    Fix,
+    Free,
+    History,
+    Kinds,
+    KindsNamed,
+    Method,
+    Plays,
+    Priors,
+    Scales,
+    Swarm,
+    Ties,
+    delay_asked,
+    drift_asked,
+    searched,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from concurrent.futures import Executor
+
+__all__ = ["campaign_command"]
+
+PARQUET = "campaign.parquet"
+
+
+@report_errors
+def campaign_command(
+    context: typer.Context,
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE", help="Logs of any format, with their units.")
+    ],
+    window: Seconds = None,
+    model: KindsNamed = None,
+    seeds: Annotated[
+        str,
+        typer.Option(metavar="N|A:B", help="Seeds of the random numbers: 0 to N-1, or A to B-1."),
+    ] = "1",
+    out: Annotated[
+        Path,
+        typer.Option(
+            metavar="FOLDER", help="Folder for the results; what it has is not computed again."
+        ),
+    ] = Path("campaign"),
+    workers: Annotated[
+        int | None, typer.Option(help="Tasks at a time, on this computer; default all cores.")
+    ] = None,
+    dask: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HOST:PORT", help="Scheduler of dask.distributed; default this computer."
+        ),
+    ] = None,
+    parquet: Annotated[
+        bool, typer.Option("--parquet", help=f"Write the table to {PARQUET} too.")
+    ] = False,
+    time: TimeColumn = None,
+    drive: DriveColumn = None,
+    displacement: DisplacementColumn = None,
+    unit: Units = None,
+    dt: Interval = None,
+    resample: Resample = None,
+    hold: HoldOption = "foh",
+    free: Free = None,
+    fix: Fix = None,
+    bound: Bound = None,
+    scale: Scales = None,
+    tie: Ties = None,
+    constrain: Constrain = None,
+    prior: Priors = None,
+    stiffness: Annotated[
+        float | None, typer.Option(help="Stiffness in N/m, if known; default a nominal 1e6.")
+    ] = None,
+    offset: Annotated[bool, typer.Option(help="Fit a constant sensor offset.")] = True,
+    delay: Delay = None,
+    drift: Drift = None,
+    history: History = None,
+    creep: Creep = None,
+    plays: Plays = None,
+    asymmetry: Asymmetry = None,
+    dynamics: Dynamics = None,
+    method: Method = None,
+    swarm: Swarm = None,
+    runs: Annotated[
+        int | None,
+        typer.Option(help="Number of independent searches; default 1, of swarms 4."),
+    ] = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Identify models of many logs; run again for the rest."""
+    from ..._support.files.writing import save_figures
+    from ...identification.campaigns.campaign import campaign
+    from ...identification.campaigns.result import check_parquet
+
+    kinds = Kinds.checked(model)
+    kinds.refuse_without_effect(context)
+    if not any(map(searched, kinds.names)):
+        refuse_without_effect(context, ("seeds",), "with models that least squares find")
+    result = Output(out, overwrite=True, json=json, quiet=quiet)
+    can_be_folder(out)
+    if parquet:
+        check_parquet()
+    options = FitOptions(
+        free=free,
+        fix=fix,
+        bound=bound,
+        scale=scale,
+        tie=tie,
+        constrain=constrain,
+        prior=prior,
+        stiffness=stiffness,
+        creep=creep,
+        plays=plays,
+        asymmetry=asymmetry,
+        dynamics=dynamics,
+        method=method,
+        swarm=swarm,
+        runs=runs,
+    )
+    options.check()
+    kinds.refuse_of_others(context)
+    of_record = {
+        "offset": offset,
+        "delay": delay_asked(delay),
+        "drift": None if drift is None else drift_asked(drift),
+        "history": history,
+    }
+    models = {
+        kind: {"model": kind, **of_record, **options.arguments_of(kind)} for kind in kinds.names
+    }
+    numbers = _seeds(seeds)
+    columns = Columns(time, drive, displacement, unit, dt)
+    logs = {
+        title: windowed(columns.read(file, hold, resample), file, "--window", window)
+        for title, file in _titles(files).items()
+    }
+    with _executor(workers, dask) as executor:
+        try:
+            found = campaign(logs, models, numbers, executor, folder=out, progress=result.progress)
+        except Interrupted:
+            acknowledge_interrupt()
+            raise
+    written = [out / "campaign.json", *dict.fromkeys(one.file for one in found)]
+    written += save_figures({"campaign": found.plot()}, out)
+    if parquet:
+        written.append(found.to_parquet(out / PARQUET))
+    if len(found.failed) == len(found):
+        first = found.failed[0]
+        raise DataError(f"no model was found of any log; {first.record}: {first.error}")
+    result.show(found.summary(), found.document(), _few(written, json=json))
+
+
+def _titles(files: list[Path]) -> dict[str, Path]:
+    """Name logs by their files, with the folders where names alone are not enough."""
+    names = [file.name for file in files]
+    titles = names if len(set(names)) == len(names) else [str(file) for file in files]
+    for i, title in enumerate(titles):
+        if title in titles[:i]:
+            raise ParameterError(f"{title} is given twice: expected it once")
+    return dict(zip(titles, files, strict=True))
+
+
+def _seeds(text: str) -> range:
+    """Parse N or A:B."""
+    first, colon, last = text.rpartition(":")
+    try:
+        found = range(int(first) if colon else 0, int(last))
+    except ValueError:
+        found = range(0)
+    if not found or found.start < 0:
+        raise ParameterError(f"--seeds is '{text}': expected a number, as 10, or A:B, as 10:20")
+    return found
+
+
+def _few(written: list[Path], *, json: bool) -> list[Path]:
+    """Leave out the names of many results, which say nothing to a person."""
+    return written if json else [path for path in written if len(path.stem) < 32]
+
+
+@contextmanager
+def _executor(workers: int | None, dask: str | None) -> Iterator[Executor | None]:
+    """Make the executor that the options ask for; None for the usual one."""
+    if workers is not None and dask is not None:
+        raise ParameterError("--workers and --dask: expected one of them at most, both are given")
+    if workers is not None and not 1 <= workers <= 256:
+        raise ParameterError(f"--workers is {workers}: expected 1 to 256")
+    if dask is not None:
+        with _cluster(dask) as client:
+            yield client.get_executor()
+        return
+    if workers is None:
+        yield None
+        return
+    pool = ThreadPoolExecutor(workers)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Any]:
+    """Connect to a scheduler."""
+    try:
+        import distributed
+    except ImportError:
+        raise ParameterError(
+            "--dask needs dask.distributed: expected it installed, as piezotrack[distributed]"
+        ) from None
+    # Its types are written in part only.
+    connect: Any = distributed.Client
+    try:
+        client = connect(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        reason = str(error).partition("\n")[0]
+        raise ParameterError(f"--dask is '{address}': no scheduler answers: {reason}") from None
+    try:
+        yield client
+    finally:
+        client.close(timeout=2)

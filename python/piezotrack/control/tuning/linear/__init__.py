@@ -1,0 +1,1 @@
+"""Linear systems of python-control, and laws that are designed with them."""

@@ -1,0 +1,149 @@
+"""Texts and pictures of tuned and of scheduled gains."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._support.display.plot_style import (
+    ACTUAL,
+    COMMAND,
+    ERROR,
+    heading,
+    legend_inside,
+    panels,
+    plain_log_ticks,
+    whole,
+)
+from ..._support.units import shown_unit
+from ..tuning.tuned import motion_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+    from ..controller.controller import Controller
+    from ..parts.filters import Filter
+    from ..parts.repetitive import Repetitive
+    from ..tuning.schedule import Schedule
+    from ..tuning.tuned import Tuned
+
+__all__ = ["plot_schedule", "plot_tuned", "schedule_text", "tuned_text"]
+
+
+def tuned_text(tuned: Tuned) -> str:
+    """Write the gains, the margins over the plants, and the active constraints."""
+    gains = [_parts(one) for one in tuned.controllers]
+    if len(gains) > 1:
+        x, y = (one.replace("\n", "; ") for one in gains)
+        gains = [f"x: {x}", f"y: {y}"]
+    rate = 1.0 / tuned.controller.dt
+    lines = [
+        *gains,
+        f"{tuned.minimised}, at {rate:.6g} Hz: {tuned.candidates} controllers evaluated, "
+        f"{tuned.loops} loops simulated",
+    ]
+    if tuned.runs:
+        scale, unit = _shown(tuned)
+        lines.append(
+            f"{scale * tuned.value:.4g} {unit} after settling, and after learning where "
+            "something learns"
+        )
+    word = "contour error " if len(gains) > 1 else ""
+    lines += [f"{motion_of(run)!r}: {word}{run.metrics}" for run in tuned.runs]
+    lines.append(f"over {len(tuned.plants)} plants:")
+    lines += [f"  {one}" for one in tuned.kept]
+    active = "; ".join(tuned.active_constraints)
+    active = active or "none: the minimum lies inside the bounds"
+    lines.append(f"active constraints: {active}")
+    return "\n".join(lines)
+
+
+def plot_tuned(tuned: Tuned, fig: Figure | SubFigure | None = None) -> Figure:
+    """Draw the figure that was made small, of the best controller after each iteration."""
+    figure = panels(fig, (6.4, 4.2))
+    ax = figure.subplots()
+    scale, unit = _shown(tuned) if tuned.runs else (tuned.controller.dt, "m s/V")
+    values = scale * np.array(tuned.history)
+    shown = np.isfinite(values)
+    ax.semilogy(np.flatnonzero(shown), values[shown], **{**ERROR, "marker": "o"})
+    ax.set(xlabel="iteration", ylabel=f"{tuned.minimised} [{unit}]")
+    ax.locator_params(axis="x", integer=True)
+    plain_log_ticks(ax)
+    heading(ax, f"{tuned.candidates} controllers evaluated, {len(tuned.plants)} plants")
+    return whole(figure)
+
+
+def schedule_text(found: Schedule) -> str:
+    """Write the gains at each place of the grid, and the errors beside those of the fixed ones."""
+    tables = [_places(found, one) for one in found.controllers]
+    if len(tables) == 1:
+        return tables[0]
+    return "\n".join(f"{axis}\n{one}" for axis, one in zip("xy", tables, strict=True))
+
+
+def plot_schedule(found: Schedule, fig: Figure | SubFigure | None = None) -> Figure:
+    """Draw the errors with the fixed and with the scheduled gains over the rate."""
+    figure = panels(fig, (6.4, 4.2))
+    ax = figure.subplots()
+    for i, (amplitude, errors) in enumerate(zip(found.amplitudes, found.errors, strict=True)):
+        for column, style, words in ((0, COMMAND, "fixed"), (1, ACTUAL, "scheduled")):
+            label = f"{words}, {1e6 * amplitude:g} um"
+            marks = {"marker": "os^D"[i], "linestyle": ("--", "-")[column], "label": label}
+            ax.plot(found.rates, 1e6 * errors[:, column], **{**style, **marks})
+    ax.set(xlabel="rate [Hz]", ylabel="rms error [um]", ylim=(0.0, None))
+    legend_inside(ax, ncols=2)
+    return whole(figure)
+
+
+def _shown(tuned: Tuned) -> tuple[float, str]:
+    """Return scale and unit of the figure along references."""
+    return (1e6, "um") if tuned.unit == "m" else (1.0, tuned.unit)
+
+
+def _parts(controller: Controller) -> str:
+    """Write the gains of a controller with their units."""
+    unit, scale = shown_unit(controller.drive_unit)
+    text = []
+    law = controller.feedback
+    if law is not None and law.info.name == "pid":
+        pid = law._pid
+        text.append(
+            f"PID: kp {1e-6 * scale * pid.kp:.4g} {unit}/um, ti {1e3 * pid.ti:.4g} ms, "
+            f"td {1e3 * pid.td:.4g} ms"
+        )
+    elif law is not None:
+        text.append(repr(law))
+    text += [_filter_text(one) for one in controller.filters]
+    if controller.repetitive is not None:
+        text.append(_repetitive_text(controller.repetitive, unit, scale))
+    return "\n".join(text) or "no feedback"
+
+
+def _filter_text(one: Filter) -> str:
+    values = one._values
+    if one.info.name == "low-pass":
+        return f"low-pass: {values['cutoff']:.4g} Hz"
+    frequency, width, depth = (values[name] for name in ("frequency", "width", "depth"))
+    return f"notch: {frequency:.4g} Hz, width {width:.3g}, depth {depth:.3g}"
+
+
+def _repetitive_text(part: Repetitive, unit: str, scale: float) -> str:
+    return (
+        f"repetitive: kq {1e-6 * scale * part.kq:.3g} {unit}/um, {part.smoothing}, "
+        f"lead {part.lead} samples, forgetting factor {part.forgetting_factor:.4g}"
+    )
+
+
+def _places(found: Schedule, controller: Controller) -> str:
+    law: Any = controller.feedback
+    unit, scale = shown_unit(controller.drive_unit)
+    lines = [f"amplitude um  rate Hz  kp {unit}/um    ti ms    td ms   rms um: fixed, scheduled"]
+    places = [(amplitude, rate) for amplitude in found.amplitudes for rate in found.rates]
+    errors = found.errors.reshape(-1, 2)
+    for (amplitude, rate), one, (before, after) in zip(places, law.gains, errors, strict=True):
+        lines.append(
+            f"{1e6 * amplitude:>12g} {rate:>8g} {1e-6 * scale * one.kp:>8.4g} "
+            f"{1e3 * one.ti:>8.3g} {1e3 * one.td:>8.3g}   {1e6 * before:.4f}, {1e6 * after:.4f}"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Binary formats of logs, most of them containers that a library reads."""

@@ -1,0 +1,1 @@
+"""Text formats of logs: delimited columns, and texts with headers."""

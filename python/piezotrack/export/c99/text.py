@@ -1,0 +1,240 @@
+"""Elements of C: numbers that are printed exactly, constants, and the fields of a state."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+__all__ = [
+    "Constant",
+    "Field",
+    "Operations",
+    "Part",
+    "array_lines",
+    "constant_text",
+    "field_text",
+    "in_order",
+    "literal",
+    "named",
+    "named_in",
+    "state_bytes",
+]
+
+# Numbers in a line of an array.
+IN_A_LINE = 2
+
+
+class Constant(NamedTuple):
+    """A constant of the C file: a number, or an array of them.
+
+    Attributes
+    ----------
+    name : str
+        In capitals.
+    value : float or sequence of float
+        The number or the numbers.
+    comment : str
+        What it is, with its unit.
+    """
+
+    name: str
+    value: float | Sequence[float]
+    comment: str
+
+
+class Field(NamedTuple):
+    """A field of the state.
+
+    Attributes
+    ----------
+    kind : {"inverse", "real", "count", "flag"}
+        The state of an inverse, a number, a count or a truth value.
+    name : str
+        Its name.
+    comment : str
+        What it is, with its unit.
+    entries : int
+        Of an array; 0 for a single one.
+    """
+
+    kind: str
+    name: str
+    comment: str
+    entries: int = 0
+
+
+class Operations(NamedTuple):
+    """Floating-point operations of a step.
+
+    Attributes
+    ----------
+    additions, multiplications, divisions : int
+        How many; a subtraction counts as an addition.
+    """
+
+    additions: int = 0
+    multiplications: int = 0
+    divisions: int = 0
+
+    def __add__(self, other: Operations) -> Operations:  # type: ignore[override]
+        return Operations(*(one + more for one, more in zip(self, other, strict=True)))
+
+    def __str__(self) -> str:
+        text = f"{self.additions} additions, {self.multiplications} multiplications"
+        return f"{text}, {self.divisions} divisions" if self.divisions else text
+
+
+NOTHING = Operations()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """A part of a controller in C.
+
+    Attributes
+    ----------
+    title : str
+        What it is, for a comment.
+    code : str
+        Its functions; NAME_ stands for the name of the export.
+    constants : tuple of Constant
+        Numbers that they use.
+    fields : tuple of Field
+        What it keeps from step to step.
+    operations : Operations
+        Of a step with valid inputs that does not saturate.
+    """
+
+    title: str
+    code: str
+    constants: tuple[Constant, ...] = ()
+    fields: tuple[Field, ...] = ()
+    operations: Operations = NOTHING
+
+
+def named(name: str, code: str) -> str:
+    """Put the name of an export in place of NAME in a piece of C."""
+    return re.sub(r"\bNAME(?=_)", name, code)
+
+
+def named_in(name: str, text: str) -> str:
+    """Put the name of an export into a whole file."""
+    return named(name, text).replace("@GUARD", name.upper()).replace("@file", name)
+
+
+def literal(value: float, name: str, *, single: bool) -> str:
+    """Write a number of C exactly, in hexadecimal, with its decimal in a comment.
+
+    Parameters
+    ----------
+    value : float
+        The number.
+    name : str
+        The constant, for messages.
+    single : bool
+        Whether it is rounded to a float.
+
+    Returns
+    -------
+    str
+        As ``0x1.8p+0 /* 1.5 */``.
+
+    Raises
+    ------
+    ParameterError
+        A float has no such number.
+
+    Examples
+    --------
+    >>> from piezotrack.export.c99.text import literal
+    >>> literal(0.1, "GAIN", single=False)
+    '0x1.999999999999ap-4 /* 0.1 */'
+    >>> literal(0.1, "GAIN", single=True)
+    '0x1.99999ap-4f /* 0.1 */'
+    """
+    value = float(value)
+    if not math.isfinite(value):
+        raise ParameterError(f"{name} is {value}: expected a finite number")
+    if not single:
+        return f"{_short(value)} /* {value!r} */"
+    with np.errstate(over="ignore", under="ignore"):
+        rounded = float(np.float32(value))
+    if not math.isfinite(rounded) or (rounded == 0.0) != (value == 0.0):
+        raise ParameterError(f"{name} is {value:g}: expected a number that a float can have")
+    return f"{_short(rounded)}f /* {value!r} */"
+
+
+def _short(value: float) -> str:
+    """Return the hexadecimal form without the zeros at the end of the digits."""
+    return re.sub(r"\.?0*p", "p", value.hex(), count=1)
+
+
+def constant_text(one: Constant, *, single: bool) -> str:
+    """Write the definition of a constant, with what it is above."""
+    above = f"/* {one.comment} */\n"
+    if isinstance(one.value, (int, float)):
+        number = literal(one.value, one.name, single=single)
+        return f"{above}static const real {one.name} = {number.replace(' /*', '; /*', 1)}\n"
+    numbers = [literal(value, one.name, single=single) for value in one.value]
+    size, body = len(numbers), array_lines(numbers)
+    return f"{above}static const real {one.name}[{size}] = {{\n{body}\n}};\n"
+
+
+def array_lines(numbers: Iterable[str]) -> str:
+    """Write the entries of an array, each with a comma before its comment."""
+    entries = [
+        number.replace(" /*", ", /*", 1) if "/*" in number else f"{number}," for number in numbers
+    ]
+    places = range(0, len(entries), IN_A_LINE)
+    return "\n".join("    " + " ".join(entries[i : i + IN_A_LINE]) for i in places)
+
+
+TYPES = {
+    "inverse": "NAME_inverse",
+    "real": "NAME_real",
+    "count": "uint32_t",
+    "flag": "uint8_t",
+}
+# Numbers in the state of an inverse: four, and the padding of a truth value.
+OF_INVERSE = 5
+
+
+def field_text(one: Field) -> str:
+    """Write the declaration of a field."""
+    array = f"[{one.entries}]" if one.entries else ""
+    return f"    {TYPES[one.kind]} {one.name}{array}; /* {one.comment} */\n"
+
+
+def in_order(fields: Iterable[Field]) -> list[Field]:
+    """Put the fields in the order of their sizes, so that none needs padding before it."""
+    return sorted(fields, key=lambda one: list(TYPES).index(one.kind))
+
+
+def state_bytes(fields: Iterable[Field], *, single: bool) -> int:
+    """Bytes of a state with these fields, as compilers lay it out.
+
+    Parameters
+    ----------
+    fields : iterable of Field
+        The fields.
+    single : bool
+        Whether a number has 4 bytes, not 8.
+
+    Returns
+    -------
+    int
+        The bytes, with the padding at the end.
+    """
+    real = 4 if single else 8
+    sizes = {"inverse": OF_INVERSE * real, "real": real, "count": 4, "flag": 1}
+    whole = sum(sizes[one.kind] * max(one.entries, 1) for one in fields)
+    return -(-whole // real) * real

@@ -1,0 +1,1 @@
+"""Controllers as co-simulation units of FMI 2.0."""

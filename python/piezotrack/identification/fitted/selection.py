@@ -1,0 +1,49 @@
+"""Choice between models: those that were tried, and on what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+__all__ = ["Selection", "Trial"]
+
+
+class Trial(NamedTuple):
+    """One kind of stage that was tried.
+
+    Attributes
+    ----------
+    model, title : str
+        Name of the model, and its title.
+    rms : float
+        Root mean square of the residual on the part that was not fitted [m]; where the record is
+        too short to be parted, on all of it.
+    """
+
+    model: str
+    title: str
+    rms: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Selection:
+    """Choice of ``model="auto"``.
+
+    Attributes
+    ----------
+    trials : tuple of Trial
+        The kinds that were tried, the best first.
+    fitted_until : float or None
+        End of the part of the window that these were fitted to [s]; they were judged on the rest.
+        None where the window is too short for two parts.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> fit = pt.identify(pt.datasets.dbo_training()[3.0:5.0], progress=False)
+    >>> fit.selection.trials[0].model == fit.model.info.name
+    True
+    """
+
+    trials: tuple[Trial, ...]
+    fitted_until: float | None

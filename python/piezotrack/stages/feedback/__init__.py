@@ -1,0 +1,1 @@
+"""Models whose hysteresis acts on the displacement, in feedback: friction."""

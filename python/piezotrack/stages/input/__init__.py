@@ -1,0 +1,1 @@
+"""Bouc-Wen models at the input, before linear mechanics."""

@@ -1,0 +1,1 @@
+"""Models made of plays at the input: Prandtl-Ishlinskii, its extensions, Maxwell slip."""

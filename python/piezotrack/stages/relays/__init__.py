@@ -1,0 +1,1 @@
+"""Models of relays and branches at the input: Preisach and Duhem."""
