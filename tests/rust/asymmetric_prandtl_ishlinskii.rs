@@ -5,7 +5,7 @@ use piezotrack_control::OperatorInverse;
 use piezotrack_control::hysteresis::Bend;
 use piezotrack_control::{AsymmetricPlayInverse, Snapshot};
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, History, PlacesKind, WeightsRecord, WeightsSettings, identify_weights,
+    CreepKind, DynamicsKind, History, NodesKind, WeightsRecord, WeightsSettings, identify_weights,
 };
 use piezotrack_core::models::{
     AsymmetricPlays, AsymmetricPrandtlIshlinskiiStage, Dynamics, Experiment, Invertible, Model,
@@ -285,7 +285,7 @@ fn a_record_gives_back_the_stage_that_made_it() {
         let record =
             WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &y, 0) };
         let settings = WeightsSettings {
-            places: PlacesKind::Given(THRESHOLDS.to_vec()),
+            nodes: NodesKind::Given(THRESHOLDS.to_vec()),
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::None,

@@ -4,7 +4,7 @@
 use piezotrack_control::OperatorInverse;
 use piezotrack_control::hysteresis::Operator;
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, History, PlacesKind, WeightsRecord, WeightsSettings, identify_weights,
+    CreepKind, DynamicsKind, History, NodesKind, WeightsRecord, WeightsSettings, identify_weights,
 };
 use piezotrack_core::models::{
     DuhemInverse, DuhemOperator, DuhemParameters, DuhemStage, Dynamics, Experiment, Invertible,
@@ -257,7 +257,7 @@ fn a_fit_finds_what_the_record_was_made_with() {
         let record =
             WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &y, 0) };
         let settings = WeightsSettings {
-            places: PlacesKind::Auto,
+            nodes: NodesKind::Auto,
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::None,

@@ -3,7 +3,7 @@
 
 use piezotrack_control::{OperatorInverse, PlayInverse};
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, History, PlacesKind, WeightsRecord, WeightsSettings, identify_weights,
+    CreepKind, DynamicsKind, History, NodesKind, WeightsRecord, WeightsSettings, identify_weights,
 };
 use piezotrack_core::models::{
     Dynamics, Experiment, GeneralisedPlays, GeneralisedPlaysInverse,
@@ -269,7 +269,7 @@ fn an_envelope_has_the_ratio_of_slopes_that_was_asked_for() {
 
 fn settings() -> WeightsSettings {
     WeightsSettings {
-        places: PlacesKind::Given(THRESHOLDS.to_vec()),
+        nodes: NodesKind::Given(THRESHOLDS.to_vec()),
         zones: 0,
         creep: CreepKind::Times(vec![]),
         dynamics: DynamicsKind::None,

@@ -71,7 +71,7 @@ fn plays_and_elements_are_converted_into_each_other() {
         let plays = stage.operator.plays.plays;
         let fitted = FittedWeights {
             linear: plays.linear,
-            places: plays.thresholds[..3].to_vec(),
+            nodes: plays.thresholds[..3].to_vec(),
             weights: plays.weights[..3].to_vec(),
             dead_zone_thresholds: vec![],
             dead_zone_weights: vec![],

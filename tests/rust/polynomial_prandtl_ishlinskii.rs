@@ -3,7 +3,7 @@
 
 use piezotrack_control::OperatorInverse;
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, History, PlacesKind, WeightsRecord, WeightsSettings, identify_weights,
+    CreepKind, DynamicsKind, History, NodesKind, WeightsRecord, WeightsSettings, identify_weights,
 };
 use piezotrack_core::models::{
     Dynamics, Experiment, Invertible, Model, Plant, PlayHysteresis, PolynomialPlays,
@@ -180,7 +180,7 @@ fn a_fit_finds_what_the_record_was_made_with() {
         let record =
             WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &y, 0) };
         let settings = WeightsSettings {
-            places: PlacesKind::Given(THRESHOLDS.to_vec()),
+            nodes: NodesKind::Given(THRESHOLDS.to_vec()),
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::None,

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use piezotrack_control::PlayInverse;
 use piezotrack_control::hysteresis::{Operator, Play};
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, History, PlacesKind, WeightsRecord, WeightsSettings, identify_weights,
+    CreepKind, DynamicsKind, History, NodesKind, WeightsRecord, WeightsSettings, identify_weights,
 };
 use piezotrack_core::math::{NOT_NEGATIVE, Rows, bounded};
 use piezotrack_core::models::{
@@ -182,7 +182,7 @@ fn a_fit_finds_what_the_record_was_made_with() {
         let drive = Drive::new(&u, 0.01, hold).unwrap();
         let y = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
         let settings = WeightsSettings {
-            places: PlacesKind::Given(vec![4.0, 10.0, 20.0]),
+            nodes: NodesKind::Given(vec![4.0, 10.0, 20.0]),
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::First,

@@ -10,7 +10,7 @@
 use piezotrack_control::hysteresis::Operator;
 use piezotrack_control::{OperatorInverse, Snapshot};
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, History, PlacesKind, WeightsRecord, WeightsSettings, identify_weights,
+    CreepKind, DynamicsKind, History, NodesKind, WeightsRecord, WeightsSettings, identify_weights,
 };
 use piezotrack_core::models::{
     Dynamics, Experiment, InputOperator, Invertible, MOST_REVERSALS, Model, Plant, PlayHysteresis,
@@ -436,7 +436,7 @@ fn a_fit_finds_what_the_record_was_made_with() {
         let record =
             WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &y, 0) };
         let settings = WeightsSettings {
-            places: PlacesKind::Given(LEVELS.to_vec()),
+            nodes: NodesKind::Given(LEVELS.to_vec()),
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::None,
@@ -468,7 +468,7 @@ fn a_fit_moves_outside_its_levels_as_within_them() {
     let record =
         WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &y, 0) };
     let settings = WeightsSettings {
-        places: PlacesKind::Given(levels),
+        nodes: NodesKind::Given(levels),
         zones: 0,
         creep: CreepKind::Times(vec![]),
         dynamics: DynamicsKind::None,

@@ -43,8 +43,9 @@ fn candidates(problem: &Problem) -> Vec<Candidate> {
 
 fn bits(evaluator: &Evaluator<'_>, candidates: &[Candidate]) -> Vec<(u64, u64, [u64; 3])> {
     let costs = evaluator.costs(candidates, NEVER);
-    let bits =
-        costs.iter().map(|c| (c.rms.to_bits(), c.offset.to_bits(), c.shares.map(f64::to_bits)));
+    let bits = costs
+        .iter()
+        .map(|c| (c.rms.to_bits(), c.offset.to_bits(), c.creep_weights.map(f64::to_bits)));
     bits.collect()
 }
 
@@ -186,7 +187,7 @@ fn one_lane_and_many_with_a_limit_that_falls_in_some() {
     }
 }
 
-/// Shares of the creep within the cost, with and without a delay.
+/// Weights of the creep within the cost, with and without a delay.
 #[test]
 fn one_lane_and_many_with_creep() {
     let (u, y) = log();
@@ -209,7 +210,7 @@ fn creeping() -> Spec {
     Spec { creep_times: vec![0.02, 0.2, 1.5], ..spec() }
 }
 
-/// A candidate that is given up has a cost beyond its limit, also with the best shares.
+/// A candidate that is given up has a cost beyond its limit, also with the best weights.
 #[test]
 fn a_bound_of_the_cost_is_never_above_it() {
     let (u, mut y) = log();

@@ -124,12 +124,12 @@ fn creeping_log(size: f64, rate: f64, samples: i32, offset: f64) -> (Vec<f64>, V
     let (u, _) = log(size, rate, samples);
     let drive = Drive::new(&u, DT, Hold::First).unwrap();
     let dahl = FirstOrderDahlStage::new(&[0.1828, 500.0, 26065.0, 0.0468, 9e3, 0.15, 1.0]).unwrap();
-    let stage = Creeping::new(dahl, &SHARES, &TIMES).unwrap();
+    let stage = Creeping::new(dahl, &WEIGHTS, &TIMES).unwrap();
     let x = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
     (u, x.iter().map(|x| x + offset).collect())
 }
 
-const SHARES: [f64; 2] = [0.02, 0.03];
+const WEIGHTS: [f64; 2] = [0.02, 0.03];
 const TIMES: [f64; 2] = [0.3, 4.0];
 
 fn creeping() -> Spec {
@@ -142,7 +142,7 @@ fn creeping() -> Spec {
 }
 
 #[test]
-fn creep_has_the_same_shares_in_all_records() {
+fn creep_has_the_same_weights_in_all_records() {
     let (slow, quick) = (creeping_log(30.0, 1.5, 2000, 3e-6), creeping_log(5.0, 40.0, 900, 0.0));
     let a = Record::new(&slow.0, &slow.1, DT, Hold::First, 0).unwrap();
     let b = Record::new(&quick.0, &quick.1, DT, Hold::First, 0).unwrap();
@@ -151,21 +151,24 @@ fn creep_has_the_same_shares_in_all_records() {
     let found = together(&[(&a, &spec), (&b, &spec)]);
     let best = &found.runs[found.best.unwrap()];
     assert!(best.costs.rms < 1e-9, "{:e}", best.costs.rms);
-    for (share, known) in best.costs.shares.iter().zip(SHARES) {
-        assert!((share / known - 1.0).abs() < 1e-3, "{:?}", best.costs.shares);
+    for (weight, known) in best.costs.creep_weights.iter().zip(WEIGHTS) {
+        assert!((weight / known - 1.0).abs() < 1e-3, "{:?}", best.costs.creep_weights);
     }
     assert!((found.records[0].costs.offset - 3e-6).abs() < 1e-9);
     assert!(found.records[1].costs.offset.abs() < 1e-9);
-    // Each record has these shares, not those that suit it best alone.
+    // Each record has these weights, not those that suit it best alone.
     for one in &found.records {
-        assert_eq!(one.costs.shares.map(f64::to_bits), best.costs.shares.map(f64::to_bits));
+        assert_eq!(
+            one.costs.creep_weights.map(f64::to_bits),
+            best.costs.creep_weights.map(f64::to_bits)
+        );
     }
 }
 
 #[test]
 fn a_record_given_twice_is_as_one() {
     let (u, y) = creeping_log(30.0, 1.5, 1200, 3e-6);
-    // Wrong by a slow wave, so that the shares are a compromise.
+    // Wrong by a slow wave, so that the weights are a compromise.
     let y: Vec<f64> =
         y.iter().zip(0..).map(|(y, k)| y + 1e-7 * libm::sin(1e-2 * f64::from(k))).collect();
     let once = Record::new(&u, &y, DT, Hold::First, 0).unwrap();
@@ -178,7 +181,7 @@ fn a_record_given_twice_is_as_one() {
     for (one, other) in alone.theta.0.iter().zip(twice.theta.0) {
         assert!((one - other).abs() <= 1e-3 * one.abs(), "{one} {other}");
     }
-    for (one, other) in alone.costs.shares.iter().zip(twice.costs.shares) {
+    for (one, other) in alone.costs.creep_weights.iter().zip(twice.costs.creep_weights) {
         assert!((one - other).abs() < 1e-4, "{one} {other}");
     }
 }

@@ -54,7 +54,7 @@ class ModelInfo:
         Unit of the drive.
     searched : bool
         Whether the parameters are searched; otherwise least squares find them.
-    places : {"thresholds", "levels", ""}
+    nodes : {"thresholds", "levels", ""}
         What an identification by least squares spreads over the drive's range: thresholds of plays,
         levels, or nothing.
     parameters, state : tuple of Parameter
@@ -65,7 +65,7 @@ class ModelInfo:
     title: str
     drive_unit: str
     searched: bool
-    places: str
+    nodes: str
     parameters: tuple[Parameter, ...]
     state: tuple[Parameter, ...]
 
@@ -101,7 +101,7 @@ def _listed(entry: dict[str, Any]) -> ModelInfo:
         title=entry["title"],
         drive_unit=entry["drive_unit"],
         searched=entry["searched"],
-        places=entry["places"],
+        nodes=entry["nodes"],
         parameters=tuple(Parameter(**one) for one in entry["parameters"]),
         state=tuple(Parameter(**one) for one in entry["state"]),
     )

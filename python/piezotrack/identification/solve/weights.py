@@ -76,7 +76,7 @@ def solve_least_squares(
     found = _core.identify_weights(
         problem,
         count=settings.count,
-        thresholds=_places(settings, info),
+        thresholds=_nodes(settings, info),
         zones=_zones(settings, info),
         creep_times=_times(settings, longest),
         dynamics=settings.dynamics or "none",
@@ -121,16 +121,16 @@ def solve_least_squares(
     )
 
 
-def _places(settings: LeastSquares, info: ModelInfo) -> list[float] | None:
+def _nodes(settings: LeastSquares, info: ModelInfo) -> list[float] | None:
     """Thresholds or levels that are given, whichever the model has."""
-    places = None
+    nodes = None
     for name, given in (("thresholds", settings.thresholds), ("levels", settings.levels)):
-        if given is not None and name != info.places:
+        if given is not None and name != info.nodes:
             raise ParameterError(
                 f"{name} is {quoted(given)}: expected None, as {info.title} has no {name}"
             )
-        places = places if given is None else list(given)
-    return places
+        nodes = nodes if given is None else list(given)
+    return nodes
 
 
 def _zones(settings: LeastSquares, info: ModelInfo) -> int:

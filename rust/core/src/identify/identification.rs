@@ -70,7 +70,7 @@ pub fn identify(
 
 /// Identifies one stage from several records, each with its own offset, delay, drift, history and weight,
 /// as [`Problem::of_records`] and [`Records`] say: no state goes from one record to the next. The
-/// creep has the same shares in all.
+/// creep has the same weights in all.
 ///
 /// # Errors
 /// As [`identify`]; [`crate::Error::Parameter`] where there is no record.

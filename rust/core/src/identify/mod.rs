@@ -24,7 +24,7 @@ pub use experiments::step_response::{
 };
 pub use identification::{Identification, OwnResult, identify, identify_together};
 pub use least_squares::{
-    CreepKind, DynamicsKind, LeastSquaresFit, PlacesKind, RecordFit, Settings as WeightsSettings,
+    CreepKind, DynamicsKind, LeastSquaresFit, NodesKind, RecordFit, Settings as WeightsSettings,
     WeightsDelay, WeightsRecord, identify_weights,
 };
 pub use parameters::bounds;
@@ -39,7 +39,7 @@ pub use parameters::prior::Prior;
 pub use parameters::relations::Relations;
 pub use parameters::tie::Tie;
 pub use problem::{Problem, Spec};
-pub use records::creep_shares::{MOST_CREEP, MOST_SHARES, Shares, creep_times};
+pub use records::creep_weights::{CreepWeights, MOST_CREEP, MOST_CREEP_WEIGHTS, creep_times};
 pub use records::history::{History, visited};
 pub use records::record::Record;
 pub use records::resonances::{Resonance, resonances};

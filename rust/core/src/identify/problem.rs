@@ -8,7 +8,7 @@ use super::parameters::delay::Delay;
 use super::parameters::drift::DriftKind;
 use super::parameters::relations::Relations;
 use super::parameters::tie::shown_text;
-use super::records::creep_shares::check_times;
+use super::records::creep_weights::check_times;
 use super::records::history::{History, came_from};
 use super::records::record::Record;
 use crate::error::{Error, Result, finite, positive};
@@ -36,7 +36,7 @@ pub struct Spec {
     pub drift: DriftKind,
     /// Motion of the stage before the record.
     pub history: History,
-    /// Time constants of the creep whose shares are fitted, s; none for no creep.
+    /// Time constants of the creep whose weights are fitted, s; none for no creep.
     pub creep_times: Vec<f64>,
     /// Scales of the search, `"linear"` or `"log"`; those that suit the bounds where not given.
     pub scales: Vec<(String, String)>,
@@ -104,7 +104,7 @@ pub struct Problem {
     pub slow: bool,
     /// Where the mass, which is held where it has no effect, may be where the record shows it.
     pub mass_if_shown: Option<Coordinate>,
-    /// Time constants of the creep whose shares are fitted, s.
+    /// Time constants of the creep whose weights are fitted, s.
     pub creep_times: Vec<f64>,
     /// Ties, inequalities and priors.
     pub relations: Relations,

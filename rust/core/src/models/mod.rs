@@ -7,8 +7,8 @@ pub mod dahl;
 mod feedback;
 mod input;
 mod lanes;
+mod nodes;
 mod parameters;
-mod places;
 mod plant;
 mod plays;
 mod registry;
@@ -35,12 +35,12 @@ pub use input::input_stage::{
     InputOperator, InputStage, InputStageFlow, InputStageState, Remembering, Segmented,
 };
 pub use input::superposition::{
-    AnySuperposition, FittedWeights, Places, Rest, Shape, Signals, SignalsOf, Superposition,
+    AnySuperposition, FittedWeights, Nodes, Rest, Shape, Signals, SignalsOf, Superposition,
 };
 pub use lanes::{LanedPlant, LanedVisitor};
+pub(crate) use nodes::check_nodes;
 pub use parameters::search_ranges::{Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges};
 pub use parameters::values::{Held, ParameterInfo, Values, position};
-pub(crate) use places::check_places;
 pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use plays::asymmetric_prandtl_ishlinskii::{
     AsymmetricPlays, AsymmetricPrandtlIshlinskiiStage, asymmetric_plays,

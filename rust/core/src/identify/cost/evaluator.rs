@@ -6,19 +6,19 @@
 //!
 //! Xu and Li 2010, equation (16), doi 10.1115/1.4001712. Where an offset is fitted, its best
 //! value for each candidate is the mean of the deviation, so the swarm does not search it; nor does
-//! it search the size of a drift, or the shares of the creep.
+//! it search the size of a drift, or the weights of the creep.
 //! Particles run in lockstep lanes, and no trajectory is stored.
 
 use piezotrack_control::Number;
 use pulp::{Arch, Simd, WithSimd};
 
+use super::creep_sums::{CreepCost, CreepSums};
 use super::motion::motion;
 use super::residual_sums::{Costs, Delayed, Direct, ResidualSums, Residuals, Simulated, add_creep};
-use super::share_sums::{ShareCost, ShareSums};
 use super::step_size;
 use crate::identify::parameters::candidate::{BEFORE, Candidate, Theta};
 use crate::identify::problem::Problem;
-use crate::identify::records::creep_shares::Shares;
+use crate::identify::records::creep_weights::CreepWeights;
 use crate::identify::records::history::visited;
 use crate::identify::records::record::Record;
 use crate::integrator::{
@@ -96,12 +96,12 @@ impl<'a> Evaluator<'a> {
         Evaluator { residuals, problem, held: problem.held(), arch, stepping, halvings, visited }
     }
 
-    /// Displacement as it is read in the window, with these shares of the creep but without offset and drift,
-    /// stepped as a cost is; `None` where it is not finite.
+    /// Displacement as it is read in the window, with these weights of the creep but without offset
+    /// and drift, stepped as a cost is; `None` where it is not finite.
     pub(in crate::identify) fn reading(
         &self,
         theta: &Theta,
-        shares: &Shares,
+        creep_weights: &CreepWeights,
         stop: Stop<'_>,
     ) -> Option<Vec<f64>> {
         let Residuals { record, creep_times, .. } = self.residuals;
@@ -118,7 +118,7 @@ impl<'a> Evaluator<'a> {
             .map(|&time| relaxed(time, dt, None, [&x, &v]))
             .map(|[q, slopes]| read(&q, &slopes))
             .collect();
-        add_creep(&mut total, &outputs?, shares);
+        add_creep(&mut total, &outputs?, creep_weights);
         Some(total)
     }
 
@@ -166,13 +166,17 @@ impl<'a> Evaluator<'a> {
         found.unwrap_or_else(|| candidates.iter().map(|_| Simulated::FAILED).collect())
     }
 
-    /// Cost and offset with these shares of the creep, from sums over the whole window.
-    pub(in crate::identify) fn costs_with(&self, sums: &ShareSums, shares: Shares) -> Costs {
-        self.residuals.costs(sums, Some(shares), self.record().window.len(), false)
+    /// Cost and offset with these weights of the creep, from sums over the whole window.
+    pub(in crate::identify) fn costs_with(
+        &self,
+        sums: &CreepSums,
+        creep_weights: CreepWeights,
+    ) -> Costs {
+        self.residuals.costs(sums, Some(creep_weights), self.record().window.len(), false)
     }
 
-    /// Cost, and shares of the creep, from sums over the whole window.
-    pub(in crate::identify) fn share_cost(&self, sums: &ShareSums) -> ShareCost {
+    /// Cost, and weights of the creep, from sums over the whole window.
+    pub(in crate::identify) fn creep_cost(&self, sums: &CreepSums) -> CreepCost {
         sums.cost(self.record().window.len(), self.problem.offset)
     }
 }

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use super::residual_sums::Costs;
-use crate::identify::records::creep_shares::MOST_SHARES;
+use crate::identify::records::creep_weights::MOST_CREEP_WEIGHTS;
 use crate::signal::Stop;
 
 /// Keeps the answers of simulations, in the order of the questions.
@@ -57,17 +57,17 @@ pub(in crate::identify) fn remembered<T: Answer>(
 
 impl Answer for Costs {
     fn length(_coordinates: usize) -> usize {
-        3 + MOST_SHARES
+        3 + MOST_CREEP_WEIGHTS
     }
 
     fn write(&self, numbers: &mut Vec<f64>, _coordinates: usize) {
         numbers.extend([self.rms, self.offset, self.drift]);
-        numbers.extend(self.shares);
+        numbers.extend(self.creep_weights);
     }
 
     fn read(numbers: &[f64], _coordinates: usize) -> Self {
         let at = |i: usize| numbers.get(i).copied().unwrap_or(f64::NAN);
-        let shares = core::array::from_fn(|i| at(3 + i));
-        Self { rms: at(0), offset: at(1), drift: at(2), shares }
+        let creep_weights = core::array::from_fn(|i| at(3 + i));
+        Self { rms: at(0), offset: at(1), drift: at(2), creep_weights }
     }
 }

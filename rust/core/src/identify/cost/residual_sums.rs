@@ -5,16 +5,18 @@ use piezotrack_control::creep::CubicLag;
 use piezotrack_control::cubic_motion::between;
 use pulp::Simd;
 
-use super::share_sums::ShareSums;
+use super::creep_sums::CreepSums;
 use crate::identify::parameters::candidate::Candidate;
 use crate::identify::parameters::drift::{DriftSums, Drifting, Fading};
-use crate::identify::records::creep_shares::{MOST_CREEP, MOST_SHARES, SLACK, Shares};
+use crate::identify::records::creep_weights::{
+    CreepWeights, MOST_CREEP, MOST_CREEP_WEIGHTS, SLACK,
+};
 use crate::identify::records::record::Record;
 use crate::integrator::{FeedbackState, Observer};
 use crate::math::Lanes;
 use crate::signal::{FractionalDelay, Stop, index};
 
-/// Cost, offset, drift and shares of the creep of a candidate.
+/// Cost, offset, drift and weights of the creep of a candidate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
     /// RMS deviation, m, times the factor of the priors where there are any; infinite where the
@@ -25,14 +27,18 @@ pub struct Costs {
     pub offset: f64,
     /// Part of the reading that fades along the window, m.
     pub drift: f64,
-    /// Shares of the creep.
-    pub shares: Shares,
+    /// Weights of the creep.
+    pub creep_weights: CreepWeights,
 }
 
 impl Costs {
     /// Cost of a candidate that could not be simulated.
-    pub(in crate::identify) const FAILED: Self =
-        Self { rms: f64::INFINITY, offset: 0.0, drift: 0.0, shares: [0.0; MOST_SHARES] };
+    pub(in crate::identify) const FAILED: Self = Self {
+        rms: f64::INFINITY,
+        offset: 0.0,
+        drift: 0.0,
+        creep_weights: [0.0; MOST_CREEP_WEIGHTS],
+    };
 }
 
 /// A record whose deviations are summed.
@@ -44,19 +50,19 @@ pub(in crate::identify) struct Residuals<'a> {
     pub offset: bool,
     /// Subtracted from the measured displacement, m, to keep the sums small.
     pub centre: f64,
-    /// Time constants of the creep whose shares are fitted, s.
+    /// Time constants of the creep whose weights are fitted, s.
     pub creep_times: &'a [f64],
     /// Whether candidates have a drift, with time constants of their own.
     pub drifts: bool,
 }
 
 impl Residuals<'_> {
-    /// Cost, offset and shares from the sums, of the best shares where none are given; a bound of
+    /// Cost, offset and weights from the sums, of the best weights where none are given; a bound of
     /// the cost where they are of the part of the window seen so far.
     pub(in crate::identify) fn costs(
         &self,
-        sums: &ShareSums,
-        given: Option<Shares>,
+        sums: &CreepSums,
+        given: Option<CreepWeights>,
         samples: usize,
         bound: bool,
     ) -> Costs {
@@ -69,17 +75,17 @@ impl Residuals<'_> {
             return Costs { rms: 0.0, ..Costs::FAILED };
         }
         let cost = sums.cost(samples, self.offset);
-        let shares = given.unwrap_or_else(|| cost.best(count));
-        let square = cost.at(&shares);
+        let creep_weights = given.unwrap_or_else(|| cost.best(count));
+        let square = cost.at(&creep_weights);
         let rms = libm::sqrt(square.max(0.0));
-        // Outputs that hardly differ may have been left out of the best shares.
+        // Outputs that hardly differ may have been left out of the best weights.
         let rms = if bound { (rms - MOST_CREEP * SLACK * cost.size()).max(0.0) } else { rms };
-        let total: f64 = shares.iter().sum();
+        let total: f64 = creep_weights.iter().sum();
         // The outputs were taken from the centre too.
-        let [mean, drift] = sums.offset_and_drift(samples, &shares);
+        let [mean, drift] = sums.offset_and_drift(samples, &creep_weights);
         let offset = if self.offset { mean + self.centre - self.centre * total } else { 0.0 };
         if rms.is_finite() && offset.is_finite() && square.is_finite() {
-            Costs { rms, offset, drift, shares }
+            Costs { rms, offset, drift, creep_weights }
         } else {
             Costs::FAILED
         }
@@ -137,7 +143,7 @@ struct Relaxing<N, R> {
     output: N,
     sum: N,
     cross: N,
-    products: [N; MOST_SHARES],
+    products: [N; MOST_CREEP_WEIGHTS],
 }
 
 /// Sums of the deviation and of its square, in lanes.
@@ -169,11 +175,11 @@ pub(in crate::identify) struct Simulated {
     /// Its cost.
     pub costs: Costs,
     /// Sums over the whole window; `None` where it was not simulated to its end.
-    pub sums: Option<ShareSums>,
+    pub sums: Option<CreepSums>,
     /// Readings at the requested samples, without offset and drift, m: with the creep where the
-    /// candidate has its shares given, else of the mechanics alone.
+    /// candidate has its weights given, else of the mechanics alone.
     pub reading: Vec<f64>,
-    /// Readings there of each relaxation of the creep, where no shares are given, m.
+    /// Readings there of each relaxation of the creep, where no weights are given, m.
     pub outputs: Vec<Vec<f64>>,
 }
 
@@ -203,7 +209,7 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
             output: zero,
             sum: zero,
             cross: zero,
-            products: [zero; MOST_SHARES],
+            products: [zero; MOST_CREEP_WEIGHTS],
         };
         let creep = of.creep_times.iter().map(relaxing).collect();
         let drift = of.drifts.then(|| {
@@ -238,10 +244,10 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
     }
 
     /// The sums of a lane.
-    fn sums(&self, lane: usize) -> ShareSums {
+    fn sums(&self, lane: usize) -> CreepSums {
         let at = |lanes: &Lanes<S, V>| lanes.as_slice().get(lane).copied().unwrap_or(f64::NAN);
         let mut sums =
-            ShareSums { deviation: [at(&self.sum), at(&self.squares)], ..ShareSums::default() };
+            CreepSums { deviation: [at(&self.sum), at(&self.squares)], ..CreepSums::default() };
         for (j, one) in self.creep.iter().enumerate() {
             sums.outputs[j] = at(&one.sum);
             sums.cross[j] = at(&one.cross);
@@ -256,7 +262,7 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
     }
 
     /// Gives up where every candidate is already beyond its limit: squares only add up, also
-    /// about the mean, and with the shares of the creep, that would suit best what has been seen.
+    /// about the mean, and with the weights of the creep, that would suit best what has been seen.
     ///
     /// A candidate's verdict is its own, whatever the other lanes hold, so it does not depend on
     /// how candidates are bundled.
@@ -270,7 +276,7 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
                 if self.verdicts[lane].is_some() {
                     continue;
                 }
-                let part = of.costs(&self.sums(lane), candidate.shares, seen, true);
+                let part = of.costs(&self.sums(lane), candidate.creep_weights, seen, true);
                 let bound = Costs { rms: share * part.rms, ..part };
                 // A hair above, so that rounding cannot abandon one that ends at its limit.
                 if bound.rms > candidate.limit * (1.0 + 1e-9) {
@@ -307,11 +313,11 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
         let lanes = self.candidates.len();
         let settled = (0..lanes).map(|lane| {
             let sums = (self.verdicts[lane].is_none() && ended).then(|| self.sums(lane));
-            let shares = self.candidates[lane].shares;
-            let costs = sums.map(|sums| self.of.costs(&sums, shares, samples, false));
+            let creep_weights = self.candidates[lane].creep_weights;
+            let costs = sums.map(|sums| self.of.costs(&sums, creep_weights, samples, false));
             (costs.or(self.verdicts[lane]).unwrap_or(Costs::FAILED), sums)
         });
-        let settled: Vec<(Costs, Option<ShareSums>)> = settled.collect();
+        let settled: Vec<(Costs, Option<CreepSums>)> = settled.collect();
         let mut kept = self.columns().into_iter();
         let mut readings: Vec<Vec<f64>> = kept.by_ref().take(lanes).collect();
         readings.resize_with(lanes, Vec::new);
@@ -327,8 +333,8 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
             if costs.rms.is_infinite() {
                 return Simulated { costs, sums, ..Simulated::FAILED };
             }
-            if let Some(shares) = candidate.shares {
-                add_creep(&mut reading, &outputs, &shares);
+            if let Some(creep_weights) = candidate.creep_weights {
+                add_creep(&mut reading, &outputs, &creep_weights);
                 outputs.clear();
             }
             Simulated { costs, sums, reading, outputs }
@@ -340,9 +346,13 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
 /// Samples whose lanes are in the nearest cache together.
 const BLOCK: usize = 64;
 
-/// Adds what is read of the relaxations of a creep, with these shares.
-pub(in crate::identify) fn add_creep(values: &mut [f64], outputs: &[Vec<f64>], shares: &Shares) {
-    for (output, share) in outputs.iter().zip(shares) {
+/// Adds what is read of the relaxations of a creep, with these weights.
+pub(in crate::identify) fn add_creep(
+    values: &mut [f64],
+    outputs: &[Vec<f64>],
+    creep_weights: &CreepWeights,
+) {
+    for (output, share) in outputs.iter().zip(creep_weights) {
         values.iter_mut().zip(output).for_each(|(x, q)| *x += share * q);
     }
 }

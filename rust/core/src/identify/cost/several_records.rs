@@ -11,13 +11,13 @@
 
 use std::sync::Arc;
 
+use super::creep_sums::{CreepCost, CreepSums};
 use super::evaluator::Evaluator;
 use super::journal::{Journal, remembered};
 use super::residual_sums::{Costs, Simulated};
-use super::share_sums::{ShareCost, ShareSums};
 use crate::identify::parameters::candidate::{Candidate, DELAY, Point, Theta};
 use crate::identify::problem::Problem;
-use crate::identify::records::creep_shares::Shares;
+use crate::identify::records::creep_weights::CreepWeights;
 use crate::signal::{NEVER, Stop, index};
 
 /// Records with one problem, and what computes their costs.
@@ -144,7 +144,7 @@ impl<'a> Records<'a> {
     }
 
     /// Costs at places, in their order; where there are priors, with their factors. Offset, drift and
-    /// shares are those of the first record.
+    /// weights are those of the first record.
     ///
     /// Those that were not finished when `stop` said so are infinite.
     #[must_use]
@@ -186,8 +186,11 @@ impl<'a> Records<'a> {
         let costs = found.iter().zip(&factors).map(|(one, factor)| {
             let rms = libm::sqrt(one.square) * factor;
             let first = &self.first().evaluator;
-            let costs =
-                if creeping > 0 { first.costs_with(&one.sums, one.shares) } else { one.first };
+            let costs = if creeping > 0 {
+                first.costs_with(&one.sums, one.creep_weights)
+            } else {
+                one.first
+            };
             Costs { rms, ..costs }
         });
         costs.collect()
@@ -202,8 +205,9 @@ impl<'a> Records<'a> {
             return vec![(theta, Costs { rms: whole.rms / factor, ..whole })];
         }
         let found = self.members.iter().map(|one| {
-            let shares = (!self.problem().creep_times.is_empty()).then_some(whole.shares);
-            let candidate = Candidate { shares, ..one.candidate(place, f64::INFINITY) };
+            let creep_weights =
+                (!self.problem().creep_times.is_empty()).then_some(whole.creep_weights);
+            let candidate = Candidate { creep_weights, ..one.candidate(place, f64::INFINITY) };
             // Also where the search was stopped: what it found so far is told.
             let costs = one.evaluator.deviations(&[candidate], NEVER);
             (candidate.theta, costs.first().copied().unwrap_or(Costs::FAILED))
@@ -215,20 +219,27 @@ impl<'a> Records<'a> {
 /// Sums at a point over the records simulated so far.
 #[derive(Clone, Copy)]
 struct Together {
-    /// Their part of the mean square of all, with the shares of the creep that suit them best, m^2.
+    /// Their part of the mean square of all, with the weights of the creep that
+    /// suit them best, m^2.
     square: f64,
-    shares: Shares,
-    cost: ShareCost,
+    creep_weights: CreepWeights,
+    cost: CreepCost,
     /// Of the first record.
     first: Costs,
-    sums: ShareSums,
+    sums: CreepSums,
 }
 
 impl Together {
     /// Of no record.
     fn none() -> Self {
-        let (cost, sums) = (ShareCost::default(), ShareSums::default());
-        Self { square: 0.0, shares: Costs::FAILED.shares, cost, first: Costs::FAILED, sums }
+        let (cost, sums) = (CreepCost::default(), CreepSums::default());
+        Self {
+            square: 0.0,
+            creep_weights: Costs::FAILED.creep_weights,
+            cost,
+            first: Costs::FAILED,
+            sums,
+        }
     }
 
     /// Adds a record with so many relaxations.
@@ -239,13 +250,13 @@ impl Together {
             (self.first, self.sums) = (simulated.costs, sums.unwrap_or_default());
         }
         let Some(sums) = sums else {
-            // Without creep; or given up or diverged, and beyond the limit with any shares.
+            // Without creep; or given up or diverged, and beyond the limit with any weights.
             self.square += of.share * simulated.costs.rms * simulated.costs.rms;
             return;
         };
-        self.cost.add(&of.evaluator.share_cost(&sums), of.share);
-        self.shares = self.cost.best(relaxations);
-        self.square = self.cost.at(&self.shares).max(0.0);
+        self.cost.add(&of.evaluator.creep_cost(&sums), of.share);
+        self.creep_weights = self.cost.best(relaxations);
+        self.square = self.cost.at(&self.creep_weights).max(0.0);
     }
 }
 

@@ -36,7 +36,7 @@ struct Along {
     spot: usize,
     step: usize,
     change: DVector<f64>,
-    /// `J^T x_vv`, with the directions of the shares; NaN where a simulation failed.
+    /// `J^T x_vv`, with the directions of the weights; NaN where a simulation failed.
     bend: DVector<f64>,
 }
 
@@ -78,9 +78,9 @@ impl Records<'_> {
     ) {
         for (r, one) in self.members().iter().enumerate() {
             let candidate = |along: &Along| {
-                let Spot { place, shares, .. } = &spots[along.spot];
+                let Spot { place, creep_weights, .. } = &spots[along.spot];
                 let moved = place.iter().zip(&along.change).map(|(z, change)| z + PART * change);
-                one.evaluator.beside(&one.own(&moved.collect::<Vec<f64>>()), *shares)
+                one.evaluator.beside(&one.own(&moved.collect::<Vec<f64>>()), *creep_weights)
             };
             let candidates: Vec<Candidate> = steps.iter().map(candidate).collect();
             let stride = one.evaluator.stride(FEW_ROWS);
@@ -117,7 +117,7 @@ fn curvature(
     let ends = simulated.reading.iter().zip(&block.read);
     let moved: Vec<f64> = ends.map(|(x, base)| x - base).collect();
     let secant = DVector::from_fn(count, |i, _| product(&block.columns[i], &moved) / PART);
-    // The shares are held.
+    // The weights are held.
     let change = DVector::from_fn(count, |i, _| change.get(slots[i]).copied().unwrap_or(0.0));
     (secant - &block.square * change) * (2.0 / PART)
 }

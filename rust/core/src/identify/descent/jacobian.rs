@@ -11,7 +11,7 @@ use crate::identify::cost::evaluator::Evaluator;
 use crate::identify::cost::residual_sums::{Simulated, add_creep};
 use crate::identify::parameters::candidate::{Candidate, Theta};
 use crate::identify::parameters::drift::{Drift, Fading};
-use crate::identify::records::creep_shares::{Shares, directions};
+use crate::identify::records::creep_weights::{CreepWeights, directions};
 use crate::signal::{Stop, index};
 
 /// Most samples of a record in the Jacobian: more would hardly change the result.
@@ -28,21 +28,21 @@ impl Evaluator<'_> {
     pub(in crate::identify) fn central(
         &self,
         place: &[f64],
-        shares: Shares,
+        creep_weights: CreepWeights,
         stop: Stop<'_>,
     ) -> Option<Block> {
         let stride = self.stride(MOST_ROWS);
         let pairs: Vec<(f64, f64)> =
             place.iter().map(|z| ((z - CHANGE).max(0.0), (z + CHANGE).min(1.0))).collect();
         let ends = pairs.iter().enumerate().flat_map(|(d, &(low, high))| [(d, low), (d, high)]);
-        let moved = ends.map(|(d, z)| self.beside(&with(place, d, z), shares));
+        let moved = ends.map(|(d, z)| self.beside(&with(place, d, z), creep_weights));
         let candidates: Vec<Candidate> = [self.at(place)].into_iter().chain(moved).collect();
         let found = self.simulated(&candidates, stride, stop);
         if found.iter().any(|one| one.reading.is_empty()) {
             return None;
         }
         let mut found = candidates.iter().zip(found);
-        let base = self.base(found.next()?, &shares, stride);
+        let base = self.base(found.next()?, &creep_weights, stride);
         let mut moved =
             found.map(|(one, found)| self.read_beside(&base, &one.theta, found.reading));
         let columns = pairs.into_iter().filter_map(|(low, high)| {
@@ -50,38 +50,38 @@ impl Evaluator<'_> {
             Some(slope(above, &below, 1.0 / (high - low)))
         });
         let columns = columns.collect();
-        Some(base.block(columns, &shares))
+        Some(base.block(columns, &creep_weights))
     }
 
     /// By one-sided differences, at each of some places.
     pub(in crate::identify) fn one_sided(
         &self,
-        places: &[(Vec<f64>, Shares)],
+        places: &[(Vec<f64>, CreepWeights)],
         stop: Stop<'_>,
     ) -> Vec<Option<Block>> {
         let stride = self.stride(FEW_ROWS);
         let change = |z: f64| if z < 0.5 { CHANGE } else { -CHANGE };
-        let neighbours = |(place, shares): &(Vec<f64>, Shares)| {
+        let neighbours = |(place, creep_weights): &(Vec<f64>, CreepWeights)| {
             let moved = place.iter().enumerate().map(|(d, z)| with(place, d, z + change(*z)));
-            let moved = moved.map(|place| self.beside(&place, *shares));
+            let moved = moved.map(|place| self.beside(&place, *creep_weights));
             [self.at(place)].into_iter().chain(moved).collect::<Vec<_>>()
         };
         let all: Vec<Candidate> = places.iter().flat_map(neighbours).collect();
         let mut found = all.iter().zip(self.simulated(&all, stride, stop));
         let own = places.iter().map(|(place, _)| found.by_ref().take(1 + place.len()).collect());
         let own: Vec<Vec<(&Candidate, Simulated)>> = own.collect();
-        let block = |(own, (place, shares)): (Vec<_>, &(Vec<f64>, Shares))| {
+        let block = |(own, (place, creep_weights)): (Vec<_>, &(Vec<f64>, CreepWeights))| {
             if own.iter().any(|(_, one): &(&Candidate, Simulated)| one.reading.is_empty()) {
                 return None;
             }
             let mut own = own.into_iter();
-            let base = self.base(own.next()?, shares, stride);
+            let base = self.base(own.next()?, creep_weights, stride);
             let columns = place.iter().zip(own).map(|(z, (one, found))| {
                 let moved = self.read_beside(&base, &one.theta, found.reading);
                 slope(moved, &base.read, 1.0 / change(*z))
             });
             let columns = columns.collect();
-            Some(base.block(columns, shares))
+            Some(base.block(columns, creep_weights))
         };
         own.into_par_iter().zip(places).map(block).collect()
     }
@@ -101,15 +101,24 @@ impl Evaluator<'_> {
         Candidate::of(self.problem().theta(place))
     }
 
-    /// One beside it, with the same shares of the creep.
-    pub(in crate::identify) fn beside(&self, place: &[f64], shares: Shares) -> Candidate {
-        Candidate { shares: Some(shares), ..self.at(place) }
+    /// One beside it, with the same weights of the creep.
+    pub(in crate::identify) fn beside(
+        &self,
+        place: &[f64],
+        creep_weights: CreepWeights,
+    ) -> Candidate {
+        Candidate { creep_weights: Some(creep_weights), ..self.at(place) }
     }
 
     /// Reading at a place, simulated with its creep apart, and the residual of the record.
-    fn base(&self, (at, found): (&Candidate, Simulated), shares: &Shares, stride: usize) -> Base {
+    fn base(
+        &self,
+        (at, found): (&Candidate, Simulated),
+        creep_weights: &CreepWeights,
+        stride: usize,
+    ) -> Base {
         let Simulated { reading: mut read, outputs, .. } = found;
-        add_creep(&mut read, &outputs, shares);
+        add_creep(&mut read, &outputs, creep_weights);
         let record = self.record();
         let measured = record.y[record.window.clone()].iter().step_by(stride);
         let mut residual: Vec<f64> = measured.zip(&read).map(|(y, x)| y - x).collect();
@@ -159,15 +168,15 @@ impl Evaluator<'_> {
         Level { offset, drift }
     }
 
-    /// Measured less simulated at a place with its shares of the creep, less what the sensor adds.
+    /// Measured less simulated at a place with its weights of the creep, less what the sensor adds.
     pub(in crate::identify) fn residual(
         &self,
         place: &[f64],
-        shares: &Shares,
+        creep_weights: &CreepWeights,
         stop: Stop<'_>,
     ) -> Option<Vec<f64>> {
         let (record, theta) = (self.record(), self.problem().theta(place));
-        let mut residual = self.reading(&theta, shares, stop)?;
+        let mut residual = self.reading(&theta, creep_weights, stop)?;
         let measured = &record.y[record.window.clone()];
         residual.iter_mut().zip(measured).for_each(|(x, y)| *x = y - *x);
         self.level(theta.drift_time(), 1).take_off(&mut residual);
@@ -190,11 +199,11 @@ struct Base {
 }
 
 impl Base {
-    /// The normal equations of the columns of a Jacobian, and of the directions in which the shares
+    /// The normal equations of the columns of a Jacobian, and of the directions in which the weights
     /// can move, with what is read at their place.
-    fn block(self, mut columns: Vec<Vec<f64>>, shares: &Shares) -> Block {
+    fn block(self, mut columns: Vec<Vec<f64>>, creep_weights: &CreepWeights) -> Block {
         let Self { stride, read, outputs, residual, level, drift } = self;
-        let directions = directions(shares);
+        let directions = directions(creep_weights);
         for direction in &directions {
             let mut column = vec![0.0; read.len()];
             add_creep(&mut column, &outputs, direction);

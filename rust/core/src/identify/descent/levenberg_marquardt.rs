@@ -64,8 +64,9 @@ impl LocalRefinement<'_> {
         let mut best = Polished { place: place.to_vec(), costs, evaluations: 0 };
         let mut damping = 1e-3;
         for _ in 0..ITERATIONS {
-            let shares = best.costs.shares;
-            let Some(normal) = self.records.normal(&best.place, shares, 1.0, self.stop) else {
+            let creep_weights = best.costs.creep_weights;
+            let Some(normal) = self.records.normal(&best.place, creep_weights, 1.0, self.stop)
+            else {
                 break;
             };
             best.evaluations += 2 * place.len() + 1;
@@ -104,7 +105,7 @@ impl LocalRefinement<'_> {
         let freedom = self.freedom(place.len());
         let Self { records, stop } = *self;
         let left = index(records.samples()) / freedom;
-        let Some(normal) = records.normal(place, costs.shares, left, stop) else {
+        let Some(normal) = records.normal(place, costs.creep_weights, left, stop) else {
             return Vec::new();
         };
         let rms = costs.rms / records.problem().relations.factor(&records.theta(place));
@@ -142,7 +143,8 @@ impl LocalRefinement<'_> {
     pub fn is_white(&self, place: &[f64], costs: &Costs) -> bool {
         self.records.members().iter().all(|one| {
             let own = one.own(place);
-            let Some(residual) = one.evaluator.residual(&own, &costs.shares, self.stop) else {
+            let Some(residual) = one.evaluator.residual(&own, &costs.creep_weights, self.stop)
+            else {
                 return false;
             };
             let squares = product(&residual, &residual);

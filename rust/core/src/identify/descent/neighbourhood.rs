@@ -5,7 +5,7 @@ use super::information::add_priors;
 use super::normal::{Block, Extended, Normal, STEPS, Spot};
 use crate::identify::cost::journal::remembered;
 use crate::identify::cost::several_records::{Member, Records};
-use crate::identify::records::creep_shares::Shares;
+use crate::identify::records::creep_weights::CreepWeights;
 use crate::signal::{Stop, index};
 
 /// Most rows of Jacobians in memory at a time.
@@ -16,17 +16,17 @@ const MOST_TOGETHER: usize = 400_000;
 const FEWEST_TOGETHER: usize = 4;
 
 impl Records<'_> {
-    /// Normal equations at a place with its shares of the creep, by central differences, with the
+    /// Normal equations at a place with its weights of the creep, by central differences, with the
     /// priors, for which the mean square of the deviations times `samples_over_freedom` is the
     /// variance of one; `None` where a neighbour cannot be simulated.
     pub(in crate::identify) fn normal(
         &self,
         place: &[f64],
-        shares: Shares,
+        creep_weights: CreepWeights,
         samples_over_freedom: f64,
         stop: Stop<'_>,
     ) -> Option<Normal> {
-        let block = |one: &Member<'_>| one.evaluator.central(&one.own(place), shares, stop);
+        let block = |one: &Member<'_>| one.evaluator.central(&one.own(place), creep_weights, stop);
         let computed = || {
             let blocks: Option<Vec<Block>> = self.members().iter().map(block).collect();
             let joined = blocks.map(|all| Extended::of(self.members(), &all, place.len()));
@@ -52,8 +52,8 @@ impl Records<'_> {
     fn differentiated(&self, spots: &[Spot], stop: Stop<'_>) -> Vec<Option<Normal>> {
         let mut all: Vec<Option<Vec<Block>>> = spots.iter().map(|_| Some(Vec::new())).collect();
         for one in self.members() {
-            let own: Vec<(Vec<f64>, Shares)> =
-                spots.iter().map(|spot| (one.own(&spot.place), spot.shares)).collect();
+            let own: Vec<(Vec<f64>, CreepWeights)> =
+                spots.iter().map(|spot| (one.own(&spot.place), spot.creep_weights)).collect();
             for (blocks, block) in all.iter_mut().zip(one.evaluator.one_sided(&own, stop)) {
                 match (blocks.as_mut(), block) {
                     (Some(blocks), Some(block)) => blocks.push(block),
@@ -71,7 +71,7 @@ impl Records<'_> {
         self.with_bends(spots, local, stop)
     }
 
-    /// The equations about the best shares of the creep, with the priors.
+    /// The equations about the best weights of the creep, with the priors.
     fn with_priors(&self, place: &[f64], of: &Extended, samples_over_freedom: f64) -> Normal {
         let (mut square, mut slope) = of.eliminated(&of.slope);
         let (rows, squares) = (of.rows, of.squares);

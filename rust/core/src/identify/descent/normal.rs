@@ -1,6 +1,6 @@
 //! Normal equations about a candidate, of one record and of all.
 //!
-//! The shares of the creep are linear: they enter as coordinates, and are eliminated (Kaufman 1975,
+//! The weights of the creep are linear: they enter as coordinates, and are eliminated (Kaufman 1975,
 //! doi 10.1007/BF01932995).
 
 use nalgebra::{DMatrix, DVector};
@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::identify::cost::journal::Answer;
 use crate::identify::cost::several_records::Member;
 use crate::identify::parameters::drift::Drift;
-use crate::identify::records::creep_shares::{LEAST_PIVOT, Shares};
+use crate::identify::records::creep_weights::{CreepWeights, LEAST_PIVOT};
 use crate::signal::index;
 
 /// Steps along which the curvature is found at a place.
@@ -30,7 +30,7 @@ pub(in crate::identify) struct Normal {
 /// Where normal equations are asked for.
 pub(in crate::identify) struct Spot {
     pub place: Vec<f64>,
-    pub shares: Shares,
+    pub creep_weights: CreepWeights,
     /// Dampings of the steps along which the curvature is asked for.
     pub dampings: [f64; STEPS],
 }
@@ -83,7 +83,7 @@ impl Answer for Option<Normal> {
 }
 
 /// Block that one record adds to them, in its own coordinates and after them the directions of the
-/// shares.
+/// weights.
 pub(in crate::identify) struct Block {
     pub square: DMatrix<f64>,
     pub slope: DVector<f64>,
@@ -95,13 +95,13 @@ pub(in crate::identify) struct Block {
     pub drift: Option<Drift>,
     /// Samples of the window to a row.
     pub stride: usize,
-    /// Columns that are of shares.
+    /// Columns that are of weights.
     pub directions: usize,
     /// Sum of r^2.
     pub squares: f64,
 }
 
-/// The equations of all records, each as much as its share, with the directions of the shares.
+/// The equations of all records, each as much as its share, with the directions of the weights.
 pub(in crate::identify) struct Extended {
     square: DMatrix<f64>,
     pub slope: DVector<f64>,
@@ -133,7 +133,7 @@ impl Extended {
         all
     }
 
-    /// The square and a right side about the best shares.
+    /// The square and a right side about the best weights.
     pub fn eliminated(&self, right: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
         let (mut square, mut right) = (self.square.clone(), right.clone());
         for last in (self.count..self.size()).rev() {

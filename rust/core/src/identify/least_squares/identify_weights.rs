@@ -2,19 +2,19 @@
 
 use super::common::Common;
 use super::result::LeastSquaresFit;
-use super::settings::{PlacesKind, Settings};
-use super::structure_selection;
+use super::settings::{NodesKind, Settings};
+use super::structure::selection;
 use super::weights_record::WeightsRecord;
 use crate::error::{Error, Result, positive};
 use crate::identify::parameters::drift::DriftKind;
 use crate::models::{
-    AnySuperposition, Dynamics, MOST_LEVELS, Model, Places, PlayHysteresis, Relaxation, SignalsOf,
-    check_places,
+    AnySuperposition, Dynamics, MOST_LEVELS, Model, Nodes, PlayHysteresis, Relaxation, SignalsOf,
+    check_nodes,
 };
 use crate::signal::{Drive, Stop, index, range, turns};
 
-/// Places that a record of few samples has to determine where nobody says how many.
-const AUTO_PLACES: usize = 10;
+/// Nodes that a record of few samples has to determine where nobody says how many.
+const AUTO_NODES: usize = 10;
 
 /// Identifies a stage of a model from one or several records; `None` where `stop` said so
 /// meanwhile. Trials go side by side on the threads of the present pool.
@@ -38,10 +38,10 @@ pub fn identify_weights(
     let zeros = |count: usize| vec![0.0; count];
     let zones = zeros(settings.zones);
     PlayHysteresis::new(1.0, &[], &[], &zones, &zones)?;
-    match &settings.places {
-        PlacesKind::Given(places) => check_places(of.places(), places)?,
-        PlacesKind::Spread(count) => check_count(of, *count)?,
-        PlacesKind::Auto => {}
+    match &settings.nodes {
+        NodesKind::Given(nodes) => check_nodes(of.nodes(), nodes)?,
+        NodesKind::Spread(count) => check_count(of, *count)?,
+        NodesKind::Auto => {}
     }
     let times = settings.creep.times();
     Relaxation::new(&zeros(times.len()), times, Dynamics::None)?;
@@ -68,18 +68,18 @@ pub fn identify_weights(
     let records =
         seen.map(|(one, (u, y))| WeightsRecord { drive: Drive { u, ..one.drive }, y, ..*one });
     let common = Common::new((model, of), records.collect(), falls, stop);
-    let found = structure_selection::search(&common, settings);
+    let found = selection::search(&common, settings);
     found.map(|fit| fit.result()).transpose()
 }
 
-/// Refuses a number of places with which no stage exists.
+/// Refuses a number of nodes with which no stage exists.
 fn check_count(of: &dyn AnySuperposition, count: usize) -> Result<()> {
     let title = of.info().title;
-    let expected = match of.places() {
-        Places::Thresholds => return Ok(()),
-        Places::Levels if (1..MOST_LEVELS).contains(&count) => return Ok(()),
-        Places::Levels => format!("1 to {} intervals between levels of {title}", MOST_LEVELS - 1),
-        Places::None => format!("None: {title} has no thresholds or levels"),
+    let expected = match of.nodes() {
+        Nodes::Thresholds => return Ok(()),
+        Nodes::Levels if (1..MOST_LEVELS).contains(&count) => return Ok(()),
+        Nodes::Levels => format!("1 to {} intervals between levels of {title}", MOST_LEVELS - 1),
+        Nodes::None => format!("None: {title} has no thresholds or levels"),
     };
     Err(Error::parameter("count", count, expected))
 }
@@ -102,13 +102,13 @@ fn mirror(
 
 /// Number of unknowns that the settings ask for at most.
 fn unknowns(of: &dyn AnySuperposition, settings: &Settings) -> usize {
-    let places = match &settings.places {
-        PlacesKind::Given(places) => places.clone(),
-        PlacesKind::Spread(count) => (0..*count).map(index).collect(),
-        PlacesKind::Auto => (0..AUTO_PLACES).map(index).collect(),
+    let nodes = match &settings.nodes {
+        NodesKind::Given(nodes) => nodes.clone(),
+        NodesKind::Spread(count) => (0..*count).map(index).collect(),
+        NodesKind::Auto => (0..AUTO_NODES).map(index).collect(),
     };
     let shape: Vec<f64> = of.shapes().iter().map(|one| one.neutral).collect();
-    let made = SignalsOf { shape: &shape, places: &places, drive: (0.0, index(AUTO_PLACES)) };
+    let made = SignalsOf { shape: &shape, nodes: &nodes, drive: (0.0, index(AUTO_NODES)) };
     1 + of.signals(&made).count() + settings.zones + settings.creep.times().len()
 }
 

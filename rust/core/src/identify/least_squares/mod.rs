@@ -7,26 +7,15 @@
 //! The numbers of the dynamics are further unknowns of these steps, from where the record's
 //! spectrum has a mode; the numbers of an envelope are searched along one line at a time.
 
-mod columns;
 mod common;
-mod fit;
-mod follower;
-mod form;
-mod gauss_newton;
 mod identify_weights;
-mod lag;
-mod layout;
-mod modes;
-mod places;
-mod record_path;
 mod result;
 mod settings;
-mod slow_parts;
-mod structure_selection;
-mod trials;
+mod solving;
+mod structure;
 mod weights_record;
 
 pub use identify_weights::identify_weights;
 pub use result::{LeastSquaresFit, RecordFit};
-pub use settings::{CreepKind, DynamicsKind, PlacesKind, Settings};
+pub use settings::{CreepKind, DynamicsKind, NodesKind, Settings};
 pub use weights_record::{WeightsDelay, WeightsRecord};

@@ -4,7 +4,7 @@
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Thresholds of plays, or levels.
-    pub places: PlacesKind,
+    pub nodes: NodesKind,
     /// Number of dead zones.
     pub zones: usize,
     /// Which creep.
@@ -15,7 +15,7 @@ pub struct Settings {
 
 /// Thresholds of plays, or levels of a grid.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PlacesKind {
+pub enum NodesKind {
     /// These, V, ascending.
     Given(Vec<f64>),
     /// So many plays, spread evenly up to half of the drive's range; so many intervals between

@@ -1,7 +1,7 @@
 //! A point of the search: the parameters of a stage, the delay and the drift of its sensor, and where it
 //! came from.
 
-use crate::identify::records::creep_shares::Shares;
+use crate::identify::records::creep_weights::CreepWeights;
 use crate::integrator::{MOST_PARAMETERS, Parameters};
 
 /// Places of a [`Theta`]: the parameters of a model, and what [`ITS_OWN`] has.
@@ -67,14 +67,14 @@ pub struct Candidate {
     pub theta: Theta,
     /// The cost, m, beyond which nobody asks how bad the candidate is; infinite for none.
     pub limit: f64,
-    /// Shares of the creep; those that suit the record best where none are given.
-    pub shares: Option<Shares>,
+    /// Weights of the creep; those that suit the record best where none are given.
+    pub creep_weights: Option<CreepWeights>,
 }
 
 impl Candidate {
-    /// Parameters that are simulated to the end however bad, with the shares that suit best.
+    /// Parameters that are simulated to the end however bad, with the weights that suit best.
     #[must_use]
     pub fn of(theta: Theta) -> Self {
-        Self { theta, limit: f64::INFINITY, shares: None }
+        Self { theta, limit: f64::INFINITY, creep_weights: None }
     }
 }

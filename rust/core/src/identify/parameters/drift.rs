@@ -13,7 +13,7 @@ use piezotrack_control::Number;
 
 use super::coordinate::{Coordinate, Scale};
 use crate::error::{Error, Result, positive};
-use crate::identify::records::creep_shares::MOST_SHARES;
+use crate::identify::records::creep_weights::MOST_CREEP_WEIGHTS;
 use crate::identify::records::record::Record;
 use crate::signal::{index, range, turns};
 
@@ -115,7 +115,7 @@ pub(in crate::identify) struct DriftSums<N> {
     /// Of g r.
     pub deviation: N,
     /// Of g and each output of the creep.
-    pub outputs: [N; MOST_SHARES],
+    pub outputs: [N; MOST_CREEP_WEIGHTS],
 }
 
 /// The same while they are accumulated in lanes.
@@ -131,7 +131,8 @@ impl<N: Number> Drifting<N> {
     /// From the first sample of a window on.
     pub fn new(keep: N, less: N) -> Self {
         let zero = keep.like(0.0);
-        let sums = DriftSums { shape: [zero; 2], deviation: zero, outputs: [zero; MOST_SHARES] };
+        let sums =
+            DriftSums { shape: [zero; 2], deviation: zero, outputs: [zero; MOST_CREEP_WEIGHTS] };
         Self { keep, less, now: keep.like(1.0), sums }
     }
 

@@ -1,6 +1,6 @@
 //! Measured records: drive and displacement, what came before them, and what they show of the stage.
 
-pub(super) mod creep_shares;
+pub(super) mod creep_weights;
 pub(super) mod history;
 pub(super) mod record;
 pub(super) mod resonances;

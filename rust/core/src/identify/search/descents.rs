@@ -106,7 +106,7 @@ impl Descent {
     /// Where it asks for normal equations, with the curvature along its steps.
     fn spot(&self) -> Spot {
         let dampings = DAMPINGS.map(|factor| factor * self.damping);
-        Spot { place: self.place.clone(), shares: self.costs.shares, dampings }
+        Spot { place: self.place.clone(), creep_weights: self.costs.creep_weights, dampings }
     }
 
     /// Takes what an iteration gained.

@@ -131,14 +131,14 @@ pub trait Remembering: InputOperator {
 pub trait Segmented: Remembering {
     /// The end of the first part of the way to `volts` along which the output is a straight line
     /// to within `deviation`, m: beyond the present input, and `volts` where all of the way is.
-    fn straight(&self, state: &Self::State, volts: f64, deviation: f64) -> f64;
+    fn next_breakpoint(&self, state: &Self::State, volts: f64, deviation: f64) -> f64;
 
     /// Largest second derivative of the output between corners, m/V^2.
-    fn bend(&self) -> f64;
+    fn largest_curvature(&self) -> f64;
 
     /// Largest change of the slope that all corners together can make, m/V; infinite where it is
     /// not known.
-    fn kink(&self) -> f64 {
+    fn slope_jump(&self) -> f64 {
         f64::INFINITY
     }
 }
@@ -282,8 +282,12 @@ impl<O: Segmented> InputStage<O> {
         if !self.relaxation.remembers() {
             return 0.0;
         }
-        // A chord of length l deviates by bend l^2 / 8 at most.
-        0.125 * self.operator.bend() * longest * longest * self.relaxation.largest_gain()
+        // A chord of length l deviates by curvature l^2 / 8 at most.
+        0.125
+            * self.operator.largest_curvature()
+            * longest
+            * longest
+            * self.relaxation.largest_gain()
     }
 
     /// Takes the drive straight to `volts` in one step, in parts where the operator's output is
@@ -304,7 +308,7 @@ impl<O: Segmented> InputStage<O> {
         let (mut done, mut parts, mut idle) = (0.0, 1, 0);
         let splits = self.relaxation.remembers() && (volts - from).abs() > *least;
         while splits && parts < MOST_PARTS && idle < MOST_IDLE {
-            let next = self.operator.straight(&state.operator, volts, *deviation);
+            let next = self.operator.next_breakpoint(&state.operator, volts, *deviation);
             let reached = (next - from) / (volts - from);
             // Not a number where the drive is none.
             if reached.is_nan() || reached > 1.0 - LEAST_PART {
@@ -397,8 +401,8 @@ impl<O: Segmented> Plant for InputStage<O> {
 
     fn flow(&self, step: f64) -> InputStageFlow {
         let flow = self.steps(step, ACCURACY);
-        // A chord across corners deviates by a quarter of kink times its length at most.
-        InputStageFlow { least: 4.0 * flow.deviation / self.operator.kink(), ..flow }
+        // A chord across corners deviates by a quarter of slope_jump times its length at most.
+        InputStageFlow { least: 4.0 * flow.deviation / self.operator.slope_jump(), ..flow }
     }
 
     #[inline(always)]

@@ -12,8 +12,8 @@ use crate::models::traits::{ModelInfo, StageModel};
 pub struct FittedWeights {
     /// Weight of the first signal, that of the drive without hysteresis.
     pub linear: f64,
-    /// Places of the signals: thresholds of plays, levels of a grid, V.
-    pub places: Vec<f64>,
+    /// Nodes of the signals: thresholds of plays, levels of a grid, V.
+    pub nodes: Vec<f64>,
     /// Weights of the other signals.
     pub weights: Vec<f64>,
     /// Thresholds of the dead zones behind them, m.
@@ -28,9 +28,9 @@ pub struct FittedWeights {
     pub relaxation: Relaxation,
 }
 
-/// Where the signals of a model have their places.
+/// Where the signals of a model have their nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Places {
+pub enum Nodes {
     /// Nowhere: a model has always the same signals.
     None,
     /// At thresholds of plays, V, up to half of the drive's range.
@@ -80,8 +80,8 @@ pub trait Signals: Debug + Send + Sync {
 pub struct SignalsOf<'a> {
     /// Numbers of the shape, see [`Superposition::shapes`].
     pub shape: &'a [f64],
-    /// Places, V, ascending.
-    pub places: &'a [f64],
+    /// Nodes, V, ascending.
+    pub nodes: &'a [f64],
     /// Range of the drive in what is fitted, V.
     pub drive: (f64, f64),
 }
@@ -112,8 +112,8 @@ pub trait Superposition: StageModel {
     /// Whether dead zones may follow the sum.
     const DEAD_ZONES: bool = false;
 
-    /// Where its signals have their places.
-    const PLACES: Places;
+    /// Where its signals have their nodes.
+    const NODES: Nodes;
 
     /// Share of the deviation that creep has to take away in the end, beside lag and drift, where
     /// the signals are so many that they follow what creep does within a cycle; `None` where it
@@ -143,8 +143,8 @@ pub trait AnySuperposition: Sync {
     fn info(&self) -> ModelInfo;
     /// See [`Superposition::DEAD_ZONES`].
     fn has_dead_zones(&self) -> bool;
-    /// See [`Superposition::PLACES`].
-    fn places(&self) -> Places;
+    /// See [`Superposition::NODES`].
+    fn nodes(&self) -> Nodes;
     /// See [`Superposition::CREEP_GAIN`].
     fn creep_gain(&self) -> Option<f64>;
     /// See [`Superposition::shapes`].
@@ -169,8 +169,8 @@ impl<M: Superposition> AnySuperposition for Of<M> {
         M::DEAD_ZONES
     }
 
-    fn places(&self) -> Places {
-        M::PLACES
+    fn nodes(&self) -> Nodes {
+        M::NODES
     }
 
     fn creep_gain(&self) -> Option<f64> {

@@ -26,7 +26,7 @@ use crate::models::input::input_stage::{
     InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, recall_plays, state_at_rest,
 };
 use crate::models::input::superposition::{
-    FittedWeights, Places, Rest, Signals, SignalsOf, Superposition,
+    FittedWeights, Nodes, Rest, Signals, SignalsOf, Superposition,
 };
 use crate::models::parameters::dynamics_parameters::same_length;
 use crate::models::parameters::values::{ParameterInfo, Values};
@@ -96,13 +96,13 @@ pub fn asymmetric_plays(
     let none = PlayFamily { thresholds: [0.0; MOST_PLAYS], weights: [0.0; MOST_PLAYS], count: 0 };
     let mut operator = AsymmetricPlays { linear, range, families: [none; 3] };
     let given = FAMILIES.iter().zip(families).zip(&mut operator.families);
-    for ((&(places, shares), (thresholds, weights)), family) in given {
+    for ((&(name, weights_name), (thresholds, weights)), family) in given {
         let count = thresholds.len();
-        same_length(shares, weights.len(), places, count, MOST_PLAYS)?;
+        same_length(weights_name, weights.len(), name, count, MOST_PLAYS)?;
         family.count = count;
-        family.thresholds[..count].copy_from_slice(&checked_thresholds(places, thresholds, "V")?);
+        family.thresholds[..count].copy_from_slice(&checked_thresholds(name, thresholds, "V")?);
         for (i, (slot, weight)) in family.weights.iter_mut().zip(weights).enumerate() {
-            *slot = along(&format!("{shares}[{i}]"), *weight, "m/V", sign)?;
+            *slot = along(&format!("{weights_name}[{i}]"), *weight, "m/V", sign)?;
         }
     }
     Ok(operator)
@@ -154,15 +154,15 @@ impl Remembering for AsymmetricPlays {
 }
 
 impl Segmented for AsymmetricPlays {
-    fn straight(&self, state: &Self::State, volts: f64, deviation: f64) -> f64 {
+    fn next_breakpoint(&self, state: &Self::State, volts: f64, deviation: f64) -> f64 {
         AsymmetricPlays::straight(self, state, volts, deviation)
     }
 
-    fn bend(&self) -> f64 {
+    fn largest_curvature(&self) -> f64 {
         AsymmetricPlays::bend(self)
     }
 
-    fn kink(&self) -> f64 {
+    fn slope_jump(&self) -> f64 {
         AsymmetricPlays::kink(self)
     }
 }
@@ -176,7 +176,8 @@ impl InputModel for AsymmetricPlays {
 
     fn build(values: &Values) -> Result<Self> {
         let number = |name| values.number(name);
-        let families = FAMILIES.map(|(places, shares)| (values.list(places), values.list(shares)));
+        let families =
+            FAMILIES.map(|(thresholds, weights)| (values.list(thresholds), values.list(weights)));
         let range = (number("low"), number("high"));
         asymmetric_plays(number("linear"), range, families)
     }
@@ -277,20 +278,20 @@ impl Signals for FamilySignals {
 }
 
 impl Superposition for AsymmetricPrandtlIshlinskiiStage {
-    const PLACES: Places = Places::Thresholds;
+    const NODES: Nodes = Nodes::Thresholds;
     const CREEP_GAIN: Option<f64> = Some(0.015);
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
-        let density = Density { thresholds: of.places.len() };
-        Box::new(FamilySignals { range: of.drive, thresholds: of.places.to_vec(), density })
+        let density = Density { thresholds: of.nodes.len() };
+        Box::new(FamilySignals { range: of.drive, thresholds: of.nodes.to_vec(), density })
     }
 
     fn values(fitted: &FittedWeights) -> Values {
         let of = fitted.clone();
-        let density = Density { thresholds: of.places.len() };
+        let density = Density { thresholds: of.nodes.len() };
         let family = |k: usize| {
             let found = of.weights.iter().skip(k * density.count()).take(density.count()).copied();
-            [of.places.clone(), density.weights(&found.collect::<Vec<f64>>())]
+            [of.nodes.clone(), density.weights(&found.collect::<Vec<f64>>())]
         };
         let numbers = [of.linear, of.drive.0, of.drive.1].map(|number| vec![number]);
         let operator = numbers.into_iter().chain((0..Bend::ALL.len()).flat_map(family));

@@ -25,7 +25,7 @@ impl Cubic {
 
     /// Its second derivative.
     #[inline]
-    pub(in crate::models) fn bend(&self, place: f64) -> f64 {
+    pub(in crate::models) fn curvature(&self, place: f64) -> f64 {
         let [_, _, c, d] = self.0;
         2.0 * c + 6.0 * d * place
     }
@@ -49,7 +49,7 @@ impl Cubic {
     /// The least and the largest value of its derivative between two places.
     pub(in crate::models) fn slopes(&self, low: f64, high: f64) -> (f64, f64) {
         // Where the derivative turns, if that is between them.
-        let turn = (-self.bend(0.0) / self.twist()).clamp(low, high);
+        let turn = (-self.curvature(0.0) / self.twist()).clamp(low, high);
         let inner = if turn.is_nan() { low } else { turn };
         let at = [low, inner, high].map(|place| self.slope(place));
         (

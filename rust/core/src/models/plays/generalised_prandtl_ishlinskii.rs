@@ -39,7 +39,7 @@ use crate::models::input::input_stage::{
     InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, recall_plays, state_at_rest,
 };
 use crate::models::input::superposition::{
-    Edges, FittedWeights, Places, PlaySignals, Rest, Shape, Signals, SignalsOf, Superposition,
+    Edges, FittedWeights, Nodes, PlaySignals, Rest, Shape, Signals, SignalsOf, Superposition,
 };
 use crate::models::parameters::values::{ParameterInfo, Values};
 use crate::models::traits::StageModel;
@@ -155,8 +155,8 @@ impl GeneralisedPlays {
             let inside = middle.abs() < tail;
             if inside { MOST_BEND * one.scale * one.slope * one.slope * weight } else { 0.0 }
         };
-        let bend = bent(&self.rising).max(bent(&self.falling));
-        let chords = libm::ceil((end - from).abs() * libm::sqrt(0.125 * bend / deviation));
+        let curvature = bent(&self.rising).max(bent(&self.falling));
+        let chords = libm::ceil((end - from).abs() * libm::sqrt(0.125 * curvature / deviation));
         if chords > 1.0 { from + (end - from) / chords } else { end }
     }
 
@@ -281,7 +281,7 @@ impl Remembering for GeneralisedPlays {
 }
 
 impl Segmented for GeneralisedPlays {
-    fn straight(&self, state: &GeneralisedPlaysState, volts: f64, deviation: f64) -> f64 {
+    fn next_breakpoint(&self, state: &GeneralisedPlaysState, volts: f64, deviation: f64) -> f64 {
         let from = state.input;
         let side = if volts < from { -1.0 } else { 1.0 };
         let envelope = if side > 0.0 { &self.rising } else { &self.falling };
@@ -312,7 +312,7 @@ impl Segmented for GeneralisedPlays {
         self.chord(from, end, weight, deviation)
     }
 
-    fn bend(&self) -> f64 {
+    fn largest_curvature(&self) -> f64 {
         let steepest = |one: &TanhEnvelope| MOST_BEND * one.scale * one.slope * one.slope;
         steepest(&self.rising).max(steepest(&self.falling)) * self.total()
     }
@@ -420,7 +420,7 @@ impl Edges for TanhEnvelope {
 }
 
 impl Superposition for GeneralisedPrandtlIshlinskiiStage {
-    const PLACES: Places = Places::Thresholds;
+    const NODES: Nodes = Nodes::Thresholds;
 
     /// Its slope at the top of the drive over that at the bottom, and how much it bends both ways:
     /// s in `B^2 = artanh(k)^2 + s^2`, where tanh's argument runs over 2 B and
@@ -431,7 +431,7 @@ impl Superposition for GeneralisedPrandtlIshlinskiiStage {
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
         let edges = TanhEnvelope::fitted(of.shape, of.drive);
-        Box::new(PlaySignals { edges, thresholds: of.places.to_vec() })
+        Box::new(PlaySignals { edges, thresholds: of.nodes.to_vec() })
     }
 
     fn values(fitted: &FittedWeights) -> Values {
@@ -440,7 +440,7 @@ impl Superposition for GeneralisedPrandtlIshlinskiiStage {
         let relaxation = of.relaxation.values();
         let operator = [
             vec![of.linear],
-            of.places,
+            of.nodes,
             of.weights,
             vec![scale],
             vec![slope],

@@ -30,7 +30,7 @@ use crate::error::{Result, not_negative, not_zero};
 use crate::models::input::input_model::InputModel;
 use crate::models::input::input_stage::{InputOperator, InputStage, Remembering, Segmented};
 use crate::models::input::superposition::{
-    FittedWeights, Places, Rest, Signals, SignalsOf, Superposition,
+    FittedWeights, Nodes, Rest, Signals, SignalsOf, Superposition,
 };
 use crate::models::parameters::dynamics_parameters::same_length;
 use crate::models::parameters::values::{ParameterInfo, Values};
@@ -152,16 +152,16 @@ impl Remembering for MaxwellSlip {
 }
 
 impl Segmented for MaxwellSlip {
-    fn straight(&self, state: &Self::State, volts: f64, deviation: f64) -> f64 {
-        self.plays.straight(state, volts, deviation)
+    fn next_breakpoint(&self, state: &Self::State, volts: f64, deviation: f64) -> f64 {
+        self.plays.next_breakpoint(state, volts, deviation)
     }
 
-    fn bend(&self) -> f64 {
-        self.plays.bend()
+    fn largest_curvature(&self) -> f64 {
+        self.plays.largest_curvature()
     }
 
-    fn kink(&self) -> f64 {
-        self.plays.kink()
+    fn slope_jump(&self) -> f64 {
+        self.plays.slope_jump()
     }
 }
 
@@ -203,14 +203,14 @@ impl MaxwellSlipStage {
 
 /// Plays are found, and say which elements they are.
 impl Superposition for MaxwellSlipStage {
-    const PLACES: Places = Places::Thresholds;
+    const NODES: Nodes = Nodes::Thresholds;
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
         PrandtlIshlinskiiStage::signals(of)
     }
 
     fn values(fitted: &FittedWeights) -> Values {
-        let operator = elements(fitted.linear, &fitted.places, &fitted.weights);
+        let operator = elements(fitted.linear, &fitted.nodes, &fitted.weights);
         Values::of(Self::INFO.parameters, operator.into_iter().chain(fitted.relaxation.values()))
     }
 

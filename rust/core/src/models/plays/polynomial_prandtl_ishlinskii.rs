@@ -27,7 +27,7 @@ use crate::models::input::input_stage::{
     InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, recall_plays, state_at_rest,
 };
 use crate::models::input::superposition::{
-    FittedWeights, Places, Plain, PlaySignals, Rest, Signals, SignalsOf, Superposition,
+    FittedWeights, Nodes, Plain, PlaySignals, Rest, Signals, SignalsOf, Superposition,
 };
 use crate::models::parameters::values::{ParameterInfo, Values};
 use crate::models::traits::StageModel;
@@ -200,22 +200,22 @@ impl Remembering for PolynomialPlays {
 }
 
 impl Segmented for PolynomialPlays {
-    fn straight(&self, state: &PolynomialPlaysState, volts: f64, deviation: f64) -> f64 {
+    fn next_breakpoint(&self, state: &PolynomialPlaysState, volts: f64, deviation: f64) -> f64 {
         let (from, rises) = (state.input, volts >= state.input);
         let end = self.corner(state, rises, ROUNDING * (from.abs() + volts.abs()));
         let to = if rises { volts.min(end) } else { volts.max(end) };
         let curve = self.polynomial(from, rises);
-        let bend = curve.bend(from).abs().max(curve.bend(to).abs());
-        let chords = libm::ceil((to - from).abs() * libm::sqrt(0.125 * bend / deviation));
+        let curvature = curve.curvature(from).abs().max(curve.curvature(to).abs());
+        let chords = libm::ceil((to - from).abs() * libm::sqrt(0.125 * curvature / deviation));
         if chords > 1.0 { from + (to - from) / chords } else { to }
     }
 
-    fn bend(&self) -> f64 {
+    fn largest_curvature(&self) -> f64 {
         let inside = &self.curve.parts[1];
-        inside.bend(self.curve.low).abs().max(inside.bend(self.curve.high).abs())
+        inside.curvature(self.curve.low).abs().max(inside.curvature(self.curve.high).abs())
     }
 
-    fn kink(&self) -> f64 {
+    fn slope_jump(&self) -> f64 {
         let (least, most) = self.curve.parts[1].slopes(self.curve.low, self.curve.high);
         let moving: f64 = self.plays.plays.weights.iter().map(|weight| weight.abs()).sum();
         moving + (most - least)
@@ -428,18 +428,18 @@ impl Signals for PlaysAndPolynomials {
 }
 
 impl Superposition for PolynomialPrandtlIshlinskiiStage {
-    const PLACES: Places = Places::Thresholds;
+    const NODES: Nodes = Nodes::Thresholds;
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
         let curve = |[a, b, c]: [f64; 3]| CubicCurve::new(Cubic([0.0, a, b, c]), of.drive);
-        let plays = PlaySignals { edges: Plain, thresholds: of.places.to_vec() };
+        let plays = PlaySignals { edges: Plain, thresholds: of.nodes.to_vec() };
         let polynomials = rising_polynomials(of.drive).map(curve);
         Box::new(PlaysAndPolynomials { plays, polynomials })
     }
 
     fn values(fitted: &FittedWeights) -> Values {
         let of = fitted.clone();
-        let (weights, bent) = of.weights.split_at(of.places.len().min(of.weights.len()));
+        let (weights, bent) = of.weights.split_at(of.nodes.len().min(of.weights.len()));
         let mut sum = [of.linear, 0.0, 0.0];
         for (polynomial, weight) in rising_polynomials(of.drive).iter().zip(bent) {
             for (entry, coefficient) in sum.iter_mut().zip(polynomial) {
@@ -448,7 +448,7 @@ impl Superposition for PolynomialPrandtlIshlinskiiStage {
         }
         let [a1, a2, a3] = sum.map(|coefficient| vec![coefficient]);
         let (low, high) = (vec![of.drive.0], vec![of.drive.1]);
-        let operator = [a1, a2, a3, low, high, of.places, weights.to_vec()];
+        let operator = [a1, a2, a3, low, high, of.nodes, weights.to_vec()];
         Values::of(Self::INFO.parameters, operator.into_iter().chain(of.relaxation.values()))
     }
 

@@ -21,7 +21,7 @@ use crate::models::input::input_stage::{
     InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, recall_plays, state_at_rest,
 };
 use crate::models::input::superposition::{
-    FittedWeights, Places, Plain, PlaySignals, Rest, Signals, SignalsOf, Superposition,
+    FittedWeights, Nodes, Plain, PlaySignals, Rest, Signals, SignalsOf, Superposition,
 };
 use crate::models::parameters::dynamics_parameters::same_length;
 use crate::models::parameters::values::{ParameterInfo, Values};
@@ -212,15 +212,15 @@ impl Remembering for PlayHysteresis {
 }
 
 impl Segmented for PlayHysteresis {
-    fn straight(&self, state: &Self::State, volts: f64, _deviation: f64) -> f64 {
+    fn next_breakpoint(&self, state: &Self::State, volts: f64, _deviation: f64) -> f64 {
         self.plays.straight(state, volts, self.count)
     }
 
-    fn bend(&self) -> f64 {
+    fn largest_curvature(&self) -> f64 {
         0.0
     }
 
-    fn kink(&self) -> f64 {
+    fn slope_jump(&self) -> f64 {
         let Plays { linear, weights, dead_zone_weights, .. } = &self.plays;
         let moving: f64 = weights.iter().map(|weight| weight.abs()).sum();
         let bent: f64 = dead_zone_weights.iter().map(|weight| weight.abs()).sum();
@@ -277,17 +277,17 @@ impl InputModel for PlayHysteresis {
 
 impl Superposition for PrandtlIshlinskiiStage {
     const DEAD_ZONES: bool = true;
-    const PLACES: Places = Places::Thresholds;
+    const NODES: Nodes = Nodes::Thresholds;
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
-        Box::new(PlaySignals { edges: Plain, thresholds: of.places.to_vec() })
+        Box::new(PlaySignals { edges: Plain, thresholds: of.nodes.to_vec() })
     }
 
     fn values(fitted: &FittedWeights) -> Values {
         let of = fitted.clone();
         let relaxation = of.relaxation.values();
         let operator =
-            [vec![of.linear], of.places, of.weights, of.dead_zone_thresholds, of.dead_zone_weights];
+            [vec![of.linear], of.nodes, of.weights, of.dead_zone_thresholds, of.dead_zone_weights];
         Values::of(Self::INFO.parameters, operator.into_iter().chain(relaxation))
     }
 

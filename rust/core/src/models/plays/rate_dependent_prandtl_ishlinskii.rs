@@ -32,7 +32,7 @@ use crate::models::input::input_stage::{
     InputOperator, InputStage, PLAYS_STATE, Remembering, Segmented, recall_plays, state_at_rest,
 };
 use crate::models::input::superposition::{
-    FittedWeights, Places, Rest, Shape, Signals, SignalsOf, Superposition,
+    FittedWeights, Nodes, Rest, Shape, Signals, SignalsOf, Superposition,
 };
 use crate::models::parameters::values::{ParameterInfo, Values};
 use crate::models::traits::StageModel;
@@ -121,11 +121,11 @@ impl Remembering for DilatedPlays {
 }
 
 impl Segmented for DilatedPlays {
-    fn straight(&self, state: &DilatedPlaysState, volts: f64, deviation: f64) -> f64 {
-        self.at(state.rate).straight(&state.plays, volts, deviation)
+    fn next_breakpoint(&self, state: &DilatedPlaysState, volts: f64, deviation: f64) -> f64 {
+        self.at(state.rate).next_breakpoint(&state.plays, volts, deviation)
     }
 
-    fn bend(&self) -> f64 {
+    fn largest_curvature(&self) -> f64 {
         0.0
     }
 }
@@ -321,7 +321,7 @@ impl Signals for DilatedSignals {
 
 impl Superposition for RateDependentPrandtlIshlinskiiStage {
     const DEAD_ZONES: bool = true;
-    const PLACES: Places = Places::Thresholds;
+    const NODES: Nodes = Nodes::Thresholds;
 
     /// The dilation, s.
     fn shapes() -> Vec<Shape> {
@@ -330,7 +330,7 @@ impl Superposition for RateDependentPrandtlIshlinskiiStage {
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
         let dilation = of.shape.first().copied().unwrap_or(0.0);
-        Box::new(DilatedSignals { thresholds: of.places.to_vec(), dilation })
+        Box::new(DilatedSignals { thresholds: of.nodes.to_vec(), dilation })
     }
 
     fn values(fitted: &FittedWeights) -> Values {
@@ -338,7 +338,7 @@ impl Superposition for RateDependentPrandtlIshlinskiiStage {
         let relaxation = of.relaxation.values();
         let operator = [
             vec![of.linear],
-            of.places,
+            of.nodes,
             of.weights,
             of.shape,
             of.dead_zone_thresholds,

@@ -20,7 +20,7 @@ use crate::error::Result;
 use crate::models::input::input_model::InputModel;
 use crate::models::input::input_stage::{InputStage, Remembering, state_at_rest};
 use crate::models::input::superposition::{
-    FittedWeights, Places, Rest, Shape, Signals, SignalsOf, Superposition,
+    FittedWeights, Nodes, Rest, Shape, Signals, SignalsOf, Superposition,
 };
 use crate::models::parameters::values::{ParameterInfo, Values};
 use crate::models::traits::StageModel;
@@ -179,7 +179,7 @@ impl Signals for Outputs {
 }
 
 impl Superposition for DuhemStage {
-    const PLACES: Places = Places::None;
+    const NODES: Nodes = Nodes::None;
 
     /// Alpha, times the range of the drive.
     fn shapes() -> Vec<Shape> {

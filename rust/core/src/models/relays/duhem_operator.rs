@@ -294,24 +294,25 @@ impl Remembering for DuhemOperator {
 }
 
 impl Segmented for DuhemOperator {
-    fn straight(&self, state: &DuhemState, volts: f64, deviation: f64) -> f64 {
+    fn next_breakpoint(&self, state: &DuhemState, volts: f64, deviation: f64) -> f64 {
         let rises = volts >= state.input;
         let limit = self.limit(rises);
         let (part, end) = limit.part(state.input, rises);
         let to = if rises { volts.min(end) } else { volts.max(end) };
         // The second derivative of a polynomial of third degree is largest at an end.
         let (curve, alpha) = (&limit.parts[part], self.parameters.alpha);
-        let bent = curve.bend(state.input).abs().max(curve.bend(to).abs());
-        let bend = bent + alpha * alpha * (state.output - curve.at(state.input)).abs();
-        let chords = libm::ceil((to - state.input).abs() * libm::sqrt(0.125 * bend / deviation));
+        let bent = curve.curvature(state.input).abs().max(curve.curvature(to).abs());
+        let curvature = bent + alpha * alpha * (state.output - curve.at(state.input)).abs();
+        let chords =
+            libm::ceil((to - state.input).abs() * libm::sqrt(0.125 * curvature / deviation));
         if chords > 1.0 { state.input + (to - state.input) / chords } else { to }
     }
 
-    fn bend(&self) -> f64 {
+    fn largest_curvature(&self) -> f64 {
         let DuhemParameters { alpha, low, high, .. } = self.parameters;
         let of = |limit: &CubicCurve| {
             let inside = &limit.parts[1];
-            let bent = inside.bend(low).abs().max(inside.bend(high).abs());
+            let bent = inside.curvature(low).abs().max(inside.curvature(high).abs());
             let (least, most) = inside.slopes(low, high);
             // The slope of a branch is within 0 and twice g.
             bent + alpha * (2.0 * self.most + least.abs().max(most.abs()))
@@ -320,7 +321,7 @@ impl Segmented for DuhemOperator {
     }
 
     /// The slope of a branch is within 0 and twice g.
-    fn kink(&self) -> f64 {
+    fn slope_jump(&self) -> f64 {
         2.0 * self.most
     }
 }

@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::models::input::input_model::InputModel;
 use crate::models::input::input_stage::{InputStage, Remembering, state_at_rest};
 use crate::models::input::superposition::{
-    FittedWeights, Places, Rest, Signals, SignalsOf, Superposition,
+    FittedWeights, Nodes, Rest, Signals, SignalsOf, Superposition,
 };
 use crate::models::parameters::values::{ParameterInfo, Values};
 use crate::models::traits::StageModel;
@@ -148,11 +148,11 @@ impl Signals for Shares {
 }
 
 impl Superposition for PreisachStage {
-    const PLACES: Places = Places::Levels;
+    const NODES: Nodes = Nodes::Levels;
 
     fn signals(of: &SignalsOf<'_>) -> Box<dyn Signals> {
         // Levels that are none have been refused.
-        let cells = Everett::of_levels(of.places).unwrap_or_else(|_| Everett::empty());
+        let cells = Everett::of_levels(of.nodes).unwrap_or_else(|_| Everett::empty());
         let reversals = PreisachOperator { linear: 1.0, everett: cells }.rest().reversals;
         let rest = [&reversals.turns()[1..], &[reversals.place()]].concat();
         let shares = Shares { cells, rest, zero: Vec::new() };
@@ -163,7 +163,7 @@ impl Superposition for PreisachStage {
 
     fn values(fitted: &FittedWeights) -> Values {
         let (linear, masses) = with_gain_outside(fitted);
-        let operator = [vec![linear], fitted.places.clone(), masses];
+        let operator = [vec![linear], fitted.nodes.clone(), masses];
         Values::of(Self::INFO.parameters, operator.into_iter().chain(fitted.relaxation.values()))
     }
 
@@ -179,7 +179,7 @@ impl Superposition for PreisachStage {
 /// becomes one outside them too, where the stage would hardly move otherwise, unless the record
 /// shows how it moves there, or 0 V is there.
 fn with_gain_outside(fitted: &FittedWeights) -> (f64, Vec<f64>) {
-    let (levels, mut masses) = (&fitted.places, fitted.weights.clone());
+    let (levels, mut masses) = (&fitted.nodes, fitted.weights.clone());
     let ends = levels.first().zip(levels.last());
     let (low, high) = (fitted.drive.0.min(0.0), fitted.drive.1.max(0.0));
     if !ends.is_some_and(|(lowest, highest)| *lowest <= low && high <= *highest) {

@@ -220,16 +220,16 @@ impl Remembering for PreisachOperator {
 }
 
 impl Segmented for PreisachOperator {
-    fn straight(&self, state: &PreisachState, volts: f64, _deviation: f64) -> f64 {
+    fn next_breakpoint(&self, state: &PreisachState, volts: f64, _deviation: f64) -> f64 {
         let corner = self.corner(state, volts >= state.input);
         if volts >= state.input { volts.min(corner) } else { volts.max(corner) }
     }
 
-    fn bend(&self) -> f64 {
+    fn largest_curvature(&self) -> f64 {
         0.0
     }
 
-    fn kink(&self) -> f64 {
+    fn slope_jump(&self) -> f64 {
         self.everett.steepest()
     }
 }

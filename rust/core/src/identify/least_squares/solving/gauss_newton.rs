@@ -1,0 +1,226 @@
+//! Gauss and Newton's method, whose steps are least squares within bounds.
+
+use core::ops::Range;
+use std::collections::VecDeque;
+
+use super::columns::Columns;
+use super::fit::Fit;
+use super::record_path::Late;
+use crate::error::Result;
+use crate::identify::least_squares::settings::{ROUGH, STEPS};
+use crate::identify::least_squares::weights_record::{WeightsDelay, WeightsRecord};
+use crate::math::Rows;
+
+/// Weight of a row that holds a sum at its bound, relative to all others together.
+const STIFF: f64 = 1e4;
+
+/// RMS deviation that a difference of two weights that are to be alike counts as, relative to it.
+const ALIKE: f64 = 1e-4;
+
+/// Where a step goes.
+struct Goal {
+    x: Vec<f64>,
+    /// RMS deviation that the linear problem has there, m, and that before the step.
+    rms: f64,
+    before: f64,
+    /// Whether no bound of this step alone keeps it from going further.
+    free: bool,
+}
+
+impl Fit<'_> {
+    /// Gauss and Newton's method until a step gains less than `gain`; `None` where stopped.
+    pub fn settle(&mut self, gain: f64) -> Option<()> {
+        self.settle_within(STEPS, gain)
+    }
+
+    /// The same for one trial of many, the best of which is settled after: the thresholds of dead
+    /// zones, which take many steps, stay as they are.
+    pub fn settle_rigid(&mut self, steps: usize) -> Option<()> {
+        self.rigid = true;
+        let settled = self.settle_within(steps, ROUGH);
+        self.rigid = false;
+        settled
+    }
+
+    /// The same with so many steps at most.
+    pub fn settle_within(&mut self, steps: usize, gain: f64) -> Option<()> {
+        for _ in 0..steps {
+            if (self.common.stop)() {
+                return None;
+            }
+            let (start, goal) = (self.x.clone(), self.goal());
+            // Rounding alone may forbid a step from which nothing is to be gained.
+            let worth = goal.before - goal.rms > gain * goal.before;
+            let mut part = 1.0;
+            loop {
+                self.x = start.iter().zip(&goal.x).map(|(a, b)| a + part * (b - a)).collect();
+                self.rms =
+                    if self.layout().admits(&self.x) { self.deviation() } else { f64::INFINITY };
+                if self.rms < goal.before || part < 1e-3 || !worth {
+                    break;
+                }
+                part *= 0.5;
+            }
+            if self.rms >= goal.before || self.rms.is_nan() {
+                (self.rms, self.x) = (goal.before, start);
+                break;
+            }
+            if goal.before - self.rms <= gain * goal.before {
+                break;
+            }
+            // What the linear problem foretold: the next one would be the same.
+            if part > 0.9 && goal.free && (self.rms - goal.rms).abs() <= gain * self.rms {
+                break;
+            }
+        }
+        Some(())
+    }
+
+    /// The solution of the problem linearised about the present unknowns.
+    fn goal(&self) -> Goal {
+        let Ok((mut rows, before)) = self.linearised() else {
+            let none = f64::INFINITY;
+            return Goal { x: self.x.clone(), rms: none, before: none, free: false };
+        };
+        let layout = self.layout();
+        let bounds = self.bounds();
+        let mut x = rows.solve(&bounds);
+        // Sums beyond their bounds are held there, one more each time.
+        let sums = layout.sums();
+        for _ in 0..sums.len() {
+            let sum = |part: &Range<usize>| x[part.clone()].iter().sum::<f64>();
+            let beyond = sums.iter().find_map(|(part, (low, high))| {
+                let sum = sum(part);
+                let bound = if sum < low - 1e-9 { low } else { high };
+                (sum < low - 1e-9 || sum > high + 1e-9).then(|| (part.clone(), *bound))
+            });
+            let Some((part, bound)) = beyond else { break };
+            let mut row = vec![0.0; self.unknowns()];
+            let stiff = STIFF * rows.size();
+            row[part].fill(stiff);
+            rows.push(&row, stiff * bound);
+            x = rows.solve(&bounds);
+        }
+        // A number that may only move so far in one step goes on in the next.
+        let moving = |still: bool, part: Range<usize>| if still { 0..0 } else { part };
+        let corners = moving(self.rigid, layout.corners());
+        let mut stops = corners.chain(moving(self.held, layout.poles()));
+        let free = stops.all(|slot| bounds[slot].0 < x[slot] && x[slot] < bounds[slot].1);
+        Goal { rms: rows.rms(&x, self.counted()), x, before, free }
+    }
+
+    /// Bounds of all unknowns for a step.
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        let ranges = self.pole_ranges();
+        let mut bounds = self.layout().bounds(&self.x, self.held, self.bent, &ranges);
+        for slot in if self.rigid { self.layout().corners() } else { 0..0 } {
+            bounds[slot] = (self.x[slot], self.x[slot]);
+        }
+        for (r, record) in self.common.records.iter().enumerate() {
+            let delay = match record.delay {
+                WeightsDelay::Known(delay) => (delay, delay),
+                WeightsDelay::Fitted(low, high) => (low, high),
+            };
+            bounds.extend(self.own(r).bounds(self.common.stroke, delay));
+        }
+        bounds
+    }
+
+    /// The rows of the linearised problem, and the RMS deviation, m.
+    fn linearised(&self) -> Result<(Rows, f64)> {
+        self.common.count(1);
+        let mut rows = Rows::new(self.unknowns());
+        let mut squares = 0.0;
+        for r in 0..self.common.records.len() {
+            squares += self.push_rows(r, &mut rows)?;
+        }
+        self.push_alike(&mut rows);
+        Ok((rows, libm::sqrt(squares / self.counted())))
+    }
+
+    /// Rows that draw weights of neighbours together where the model asks for it.
+    fn push_alike(&self, rows: &mut Rows) {
+        let size = ALIKE * libm::sqrt(self.counted());
+        for (one, other) in self.signals.alike() {
+            let mut row = vec![0.0; self.unknowns()];
+            (row[one], row[other]) = (size, -size);
+            rows.push(&row, 0.0);
+        }
+    }
+
+    /// The rows of one record; the sum of the squares of what is left, each as often as it counts.
+    fn push_rows(&self, r: usize, rows: &mut Rows) -> Result<f64> {
+        let WeightsRecord { drive, y, start, .. } = self.common.records[r];
+        let (layout, own) = (self.layout(), self.own(r));
+        let (added, fades) = (self.added(r), self.fading(r));
+        let mut columns = Columns::of(self, r)?;
+        let exact = if self.exact { Some(self.undelayed(r)?) } else { None };
+        let late = Late::new(self.delay(r), drive.dt);
+        let factor = libm::sqrt(self.weight(r));
+        let mut recent = Recent::new(columns.count(), late);
+        let mut row = vec![0.0; self.unknowns()];
+        let mut judged = self.judged(r).peekable();
+        let mut motion = Vec::with_capacity(self.windows[r].end);
+        let mut squares = 0.0;
+        while let Some((first, count)) = columns.next() {
+            for (i, k) in (first..first + count).enumerate() {
+                motion.push(exact.as_ref().map_or(columns.displacement(i), |exact| exact[k]));
+                let counts = judged.next_if_eq(&k).is_some();
+                if !counts && late.is_none() {
+                    continue;
+                }
+                recent.push(columns.row(i));
+                if !counts {
+                    continue;
+                }
+                recent.read(&mut row[..layout.count()], 0);
+                recent.read(&mut row[own.departures.clone()], layout.count());
+                row[own.offset.clone()].fill(1.0);
+                row[own.drift.clone()].fill(fades(k, start));
+                let (before, after) = late.between(k);
+                row[own.delay.clone()].fill((motion[before] - motion[after]) / drive.dt);
+                let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
+                let left = factor * (y[k] - late.of(k, |k| motion[k]) - added(k));
+                squares += left * left;
+                for entry in &mut row {
+                    *entry *= factor;
+                }
+                rows.push(&row, factor.mul_add(known, left));
+            }
+        }
+        Ok(squares)
+    }
+}
+/// The rows of the latest samples, as many as a late reading needs.
+struct Recent {
+    rows: VecDeque<Vec<f64>>,
+    length: usize,
+    late: Late,
+}
+
+impl Recent {
+    fn new(length: usize, late: Late) -> Self {
+        Self { rows: VecDeque::new(), length, late }
+    }
+
+    /// Takes the row of the next sample.
+    fn push(&mut self, row: &[f64]) {
+        let kept = if self.late.is_none() { 1 } else { self.late.whole() + 2 };
+        let oldest = if self.rows.len() < kept { None } else { self.rows.pop_front() };
+        let mut slot = oldest.unwrap_or_else(|| vec![0.0; self.length]);
+        slot.copy_from_slice(row);
+        self.rows.push_back(slot);
+    }
+
+    /// The entries from `from` on as they are read at the latest sample.
+    fn read(&self, entries: &mut [f64], from: usize) {
+        let last = self.rows.len() - 1;
+        if self.late.is_none() {
+            entries.copy_from_slice(&self.rows[last][from..from + entries.len()]);
+            return;
+        }
+        for (i, entry) in entries.iter_mut().enumerate() {
+            *entry = self.late.of(last, |k| self.rows[k][from + i]);
+        }
+    }
+}

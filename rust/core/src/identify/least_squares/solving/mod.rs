@@ -1,0 +1,9 @@
+//! The unknowns of a fit with a given structure, and the steps that find them.
+
+mod columns;
+pub(super) mod fit;
+mod follower;
+pub(super) mod form;
+mod gauss_newton;
+mod layout;
+mod record_path;

@@ -1,0 +1,220 @@
+//! The way of a stage through one of the records: memory and creep before it, and its motion.
+
+use std::sync::Arc;
+
+use super::fit::Fit;
+use super::follower::Follower;
+use crate::error::Result;
+use crate::identify::records::history::{History, visited};
+use crate::models::{Dynamics, Experiment, Relaxation, Rest, Values};
+use crate::signal::{FractionalDelay, index};
+
+/// Signals of a record that are kept, at most: those of a longer one are made whenever they are needed.
+const MOST_KEPT: usize = 1 << 22;
+
+/// Signals of a drive, and the memory that they come from.
+#[derive(Clone, Debug)]
+pub(in crate::identify::least_squares) struct Path {
+    pub memory: Vec<f64>,
+    pub signals: Vec<f64>,
+}
+
+/// The signals of a record, sample by sample.
+pub(in crate::identify::least_squares) struct Walk<'f, 'a> {
+    fit: &'f Fit<'a>,
+    r: usize,
+    k: usize,
+    path: Path,
+    kept: Option<Arc<[f64]>>,
+}
+
+impl Walk<'_, '_> {
+    /// The signals at the next sample, of which there is one.
+    #[inline(always)]
+    pub fn next(&mut self) -> &[f64] {
+        let (k, width) = (self.k, self.path.signals.len());
+        self.k += 1;
+        if let Some(kept) = &self.kept {
+            return &kept[k * width..][..width];
+        }
+        let record = &self.fit.common.records[self.r];
+        self.fit.push(&mut self.path, record.drive.u[k], record.step(k));
+        &self.path.signals
+    }
+}
+
+impl<'a> Fit<'a> {
+    /// The way of record `r` from its first sample on.
+    pub fn walk<'f>(&'f self, r: usize) -> Walk<'f, 'a> {
+        let walk = || Walk { fit: self, r, k: 0, path: self.before(r), kept: None };
+        let samples = self.common.records[r].drive.u.len();
+        let count = samples * self.signals.count();
+        if count > MOST_KEPT {
+            return walk();
+        }
+        let make = || {
+            let (mut walk, mut all) = (walk(), Vec::with_capacity(count));
+            for _ in 0..samples {
+                all.extend_from_slice(walk.next());
+            }
+            all.into()
+        };
+        let kept = self.kept[r].get_or_init(make).clone();
+        let path = Path { memory: Vec::new(), signals: vec![0.0; self.signals.count()] };
+        Walk { fit: self, r, k: 0, path, kept: Some(kept) }
+    }
+
+    /// The signals after the voltages that the stage visited slowly before record `r`.
+    pub fn before(&self, r: usize) -> Path {
+        let mut path =
+            Path { memory: self.signals.rest(), signals: vec![0.0; self.signals.count()] };
+        let begin = self.begins[r];
+        for volts in visited(&self.common.records[r].drive, begin.history, begin.from) {
+            self.push(&mut path, volts, f64::INFINITY);
+        }
+        path
+    }
+
+    /// Takes the drive to `volts` within `dt` seconds.
+    #[inline(always)]
+    pub fn push(&self, path: &mut Path, volts: f64, dt: f64) {
+        self.signals.follow(&mut path.memory, volts, dt, &mut path.signals);
+    }
+
+    /// Where the creep stands before record `r` behind each of so many inputs.
+    pub fn creep_before(&self, r: usize, width: usize) -> Vec<Vec<f64>> {
+        let drive = self.common.records[r].drive;
+        let mut walk = self.walk(r);
+        let mut inputs = vec![0.0; width];
+        let mut take = |inputs: &mut Vec<f64>| {
+            if width == 1 {
+                inputs[0] = self.bent(self.sum(walk.next()));
+            } else {
+                self.inputs(walk.next(), inputs);
+            }
+        };
+        take(&mut inputs);
+        let relaxed = |input: &f64| vec![*input; self.times.len()];
+        if self.begins[r].history != History::Settled || self.times.is_empty() {
+            let mut reached: Vec<Vec<f64>> = inputs.iter().map(relaxed).collect();
+            let departures = &self.x[self.own(r).departures];
+            if let Some(whole) = reached.last_mut() {
+                whole.iter_mut().zip(departures).for_each(|(q, departure)| *q += departure);
+            }
+            return reached;
+        }
+        // From 0 through the record; q repeats that begins at its end / (1 - exp(-T / tau)).
+        let Ok(creep) = Relaxation::new(&vec![0.0; self.times.len()], &self.times, Dynamics::None)
+        else {
+            return inputs.iter().map(relaxed).collect();
+        };
+        let flow = creep.flow(drive.dt);
+        let mut followers: Vec<Follower> =
+            inputs.iter().map(|input| Follower::at_rest(&creep, *input, &[])).collect();
+        for _ in &drive.u[1..] {
+            take(&mut inputs);
+            for (follower, input) in followers.iter_mut().zip(&inputs) {
+                follower.next(&creep, &flow, drive.hold, *input);
+            }
+        }
+        let length = drive.dt * index(drive.u.len() - 1);
+        let repeats = |time: &f64| -libm::expm1(-length / time);
+        let factors: Vec<f64> = self.times.iter().map(repeats).collect();
+        let of = |follower: &Follower| {
+            follower.state.creep.iter().zip(&factors).map(|(end, factor)| end / factor).collect()
+        };
+        followers.iter().map(of).collect()
+    }
+
+    /// Displacement of record `r` up to the end of its window as it is read, m: without what the
+    /// sensor adds.
+    pub fn motion(&self, r: usize) -> Result<Vec<f64>> {
+        let x = self.undelayed(r)?;
+        let late = Late::new(self.delay(r), self.common.records[r].drive.dt);
+        if late.is_none() {
+            return Ok(x);
+        }
+        Ok((0..x.len()).map(|k| late.of(k, |k| x[k])).collect())
+    }
+
+    /// The same before it is read.
+    pub fn undelayed(&self, r: usize) -> Result<Vec<f64>> {
+        let drive = self.common.records[r].drive;
+        if self.exact {
+            let (values, start) = (self.values(false)?, self.start(r, false)?);
+            let experiment =
+                Experiment { initial: Some(&start), ..Experiment::of(&drive, self.common.stop) };
+            let stage = self.common.model.build(&values)?;
+            return Ok(stage.simulate(&experiment)?.ok_or_else(Self::stopped)?.x);
+        }
+        let relaxation = self.relaxation()?;
+        let flow = relaxation.flow(drive.dt);
+        let mut walk = self.walk(r);
+        let creep = self.creep_before(r, 1);
+        let mut follower: Option<Follower> = None;
+        let through = |_| {
+            let output = self.bent(self.sum(walk.next()));
+            match &mut follower {
+                Some(follower) => follower.next(&relaxation, &flow, drive.hold, output),
+                none => none.insert(Follower::at_rest(&relaxation, output, &creep[0])).state.x,
+            }
+        };
+        Ok((0..self.windows[r].end).map(through).collect())
+    }
+
+    /// State of the stage before the first sample of record `r`; that of its mirror image where it
+    /// is to fall.
+    pub fn start(&self, r: usize, falls: bool) -> Result<Values> {
+        let sign = if falls { -1.0 } else { 1.0 };
+        // Either the drive was turned or the displacement.
+        let turned = self.common.of.has_dead_zones();
+        let (of_drive, of_motion) = if turned { (sign, 1.0) } else { (1.0, sign) };
+        let relaxation = self.relaxation()?;
+        let first = self.common.records[r].drive.u[0];
+        let mut path = self.before(r);
+        self.push(&mut path, first, f64::INFINITY);
+        let creep = &self.creep_before(r, 1)[0];
+        let output = self.bent(self.sum(&path.signals));
+        let at_rest = Follower::at_rest(&relaxation, output, creep).state.x;
+        let modes = self.dynamics().further().len();
+        let memory: Vec<f64> = path.memory.iter().map(|one| of_drive * one).collect();
+        let creep: Vec<f64> = creep.iter().map(|q| of_motion * q).collect();
+        let (x, volts) = (of_motion * at_rest, of_drive * first);
+        let sum = of_motion * self.sum(&path.signals);
+        let rest = Rest { x, volts, sum, memory: &memory, creep: &creep, modes };
+        Ok(self.common.of.state_at_rest(&rest))
+    }
+}
+
+/// A reading that comes late, on straight lines between samples; before the first sample the stage
+/// is where it starts.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::identify::least_squares) struct Late(FractionalDelay);
+
+impl Late {
+    pub fn new(delay: f64, dt: f64) -> Self {
+        Self(FractionalDelay::new(delay, dt))
+    }
+
+    /// Whether readings are in time.
+    pub fn is_none(self) -> bool {
+        self.0.whole == 0 && self.0.part >= 1.0
+    }
+
+    /// Reading at sample `k` of values at samples.
+    pub fn of(self, k: usize, at: impl Fn(usize) -> f64) -> f64 {
+        let (before, after) = self.between(k);
+        let before = at(before);
+        self.0.part.mul_add(at(after) - before, before)
+    }
+
+    /// The samples between which it is read at sample `k`.
+    pub fn between(self, k: usize) -> (usize, usize) {
+        (k.saturating_sub(self.0.whole + 1), k.saturating_sub(self.0.whole))
+    }
+
+    /// Whole samples of the delay.
+    pub fn whole(self) -> usize {
+        self.0.whole
+    }
+}

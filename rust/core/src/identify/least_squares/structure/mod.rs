@@ -1,0 +1,8 @@
+//! The structure of a fit: nodes, modes, lag, creep and drifts, each chosen from trials.
+
+mod lag;
+mod modes;
+mod nodes;
+pub(super) mod selection;
+mod slow_parts;
+mod trials;

@@ -1,0 +1,362 @@
+//! Which structure a record asks for: plays, history, creep, dynamics.
+//!
+//! Each is decided in turn on the least squares so far, and has to earn its place.
+
+use super::lag::{best_lag, smallest_lag};
+use super::modes::{drop_modes, first_mode};
+use super::nodes::{add_once, choose_nodes, few_or_many, spread};
+use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
+use super::trials::{side_by_side, with_each};
+use crate::identify::least_squares::common::{Common, Thinned};
+use crate::identify::least_squares::settings::{
+    CreepKind, DynamicsKind, FIRST_SHARE, MODE_GAIN, NodesKind, ROUGH, SAME, STEPS, Settings,
+};
+use crate::identify::least_squares::solving::fit::{Beginning, Fit};
+use crate::identify::least_squares::solving::form::Form;
+use crate::identify::least_squares::weights_record::WeightsRecord;
+use crate::identify::records::history::History;
+use crate::math::least;
+use crate::signal::{index, range};
+
+/// Rounds over the numbers of an envelope, at most.
+const SHAPE_ROUNDS: usize = 20;
+
+/// Least share by which a number of an envelope has to lower the deviation before it leaves the
+/// middle of its range: what a record does not determine is not changed.
+const SHAPE_GAIN: f64 = 0.1;
+
+/// Shares of the deviation that histories and modes have to take away.
+const HISTORY_GAIN: f64 = 0.02;
+/// Share of the deviation that a mode has to take away whose resonance no record shows, and how far
+/// it is above the drive: it would also explain some of the creep, or of what the plays do not.
+const UNSEEN_GAIN: f64 = 0.15;
+const ABOVE_DRIVE: f64 = 10.0;
+
+/// Share of the deviation that dead zones in other places have to take away.
+const CORNER_GAIN: f64 = 0.02;
+
+/// Rows that choices are made on, about.
+const ROWS: usize = 4000;
+
+/// Longest interval of a thinned record, as a phase of the drive, rad: its peaks are then known to
+/// a thousandth of the travel.
+const LONGEST_PHASE: f64 = 0.06;
+
+/// Steps of a trial among many: the best one is settled.
+const FEW_STEPS: usize = 2;
+
+/// The best stage; `None` where stopped.
+pub(in crate::identify::least_squares) fn search<'a>(
+    common: &'a Common<'a>,
+    settings: &Settings,
+) -> Option<Fit<'a>> {
+    let kept: Vec<Thinned> =
+        common.records.iter().map(|one| Thinned::of(one, thinning(one))).collect();
+    let few = common.thinned(&kept);
+    let chosen = choose(&few, settings)?;
+    common.count(few.evaluations());
+    let mut fit = chosen.on(common);
+    fit.settle(1e-4)?;
+    fit.exact = true;
+    fit.settle(1e-8)?;
+    drop_modes(&mut fit)?;
+    Some(fit)
+}
+
+/// Every how many samples the choices are made on: where the drive is slow all the time, as many as
+/// leave [`ROWS`].
+fn thinning(record: &WeightsRecord<'_>) -> usize {
+    let of = record.measures();
+    let most = LONGEST_PHASE / (of.frequency * record.drive.dt);
+    let every = record.samples() / ROWS;
+    let few = of.excited().is_none() && index(every) < most && !record.is_delayed();
+    if few { every.max(1) } else { 1 }
+}
+
+/// The structure, on records that may be thinned.
+fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
+    let nodes = match &settings.nodes {
+        NodesKind::Given(nodes) => nodes.clone(),
+        NodesKind::Spread(count) => spread(common, (*count, 1.0), false),
+        NodesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
+    };
+    let mut fit = Fit::new(common, &nodes);
+    let every = |one: &WeightsRecord<'_>| one.samples().div_ceil(ROWS);
+    fit.every = common.records.iter().map(every).collect();
+    fit.settle(ROUGH)?;
+    search_shape(&mut fit)?;
+    place_corners(&mut fit, settings.zones);
+    fit.settle(ROUGH)?;
+    let mode = first_mode(&mut fit, settings)?;
+    if let CreepKind::Times(times) = &settings.creep {
+        fit.restructure(|fit| fit.times.clone_from(times));
+        fit.settle(ROUGH)?;
+    }
+    // With a lag, or what it does would be taken for a history.
+    let lags = matches!(settings.dynamics, DynamicsKind::First | DynamicsKind::Auto) && !mode;
+    if lags {
+        fit = best_lag(&fit)?;
+    }
+    choose_histories(&mut fit, settings)?;
+    if lags {
+        fit.set_poles(Form::None, &[]);
+        fit.settle(ROUGH)?;
+    }
+    choose_slow(&mut fit, settings)?;
+    choose_dynamics_and_creep(&mut fit, settings, mode)?;
+    choose_nodes(&mut fit, settings)?;
+    drop_drifts(&mut fit)?;
+    replace_corners(&mut fit)?;
+    Some(fit)
+}
+
+/// Spreads the dead zones over what comes out of the plays in the windows.
+fn place_corners(fit: &mut Fit<'_>, count: usize) {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for (r, record) in fit.common.records.iter().enumerate() {
+        let mut path = fit.before(r);
+        for (k, &volts) in record.drive.u.iter().enumerate() {
+            fit.push(&mut path, volts, record.step(k));
+            if k >= record.start {
+                let value = fit.sum(&path.signals);
+                (low, high) = (low.min(value), high.max(value));
+            }
+        }
+    }
+    let corner = |j: usize| low + (high - low) * index(j) / index(count + 1);
+    fit.restructure(|fit| (fit.zones, fit.bent) = (count, (low, high)));
+    for (j, slot) in fit.layout().corners().enumerate() {
+        fit.x[slot] = corner(j + 1);
+    }
+}
+
+/// Spreads the dead zones anew, where that is better: while other parts were missing, they may have
+/// moved to where they cannot come back from.
+fn replace_corners(fit: &mut Fit<'_>) -> Option<()> {
+    if fit.zones == 0 {
+        return Some(());
+    }
+    let mut anew = fit.clone();
+    place_corners(&mut anew, fit.zones);
+    anew.settle(ROUGH)?;
+    if anew.rms < (1.0 - CORNER_GAIN) * fit.rms {
+        *fit = anew;
+    }
+    Some(())
+}
+
+/// The numbers of the shape in turn, each from its range.
+fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
+    let ranges: Vec<(f64, f64)> = fit.common.of.shapes().iter().map(|one| one.range).collect();
+    let mut released = vec![false; ranges.len()];
+    for _ in 0..SHAPE_ROUNDS {
+        let round = fit.rms;
+        for (i, &range) in ranges.iter().enumerate() {
+            let here = fit.clone();
+            let mut best = here.clone();
+            least(range, 1e-4, |place| {
+                let mut trial = best.clone();
+                trial.reshape(i, place);
+                trial.settle(1e-5)?;
+                let rms = trial.rms;
+                if rms < best.rms {
+                    best = trial;
+                }
+                Some(rms)
+            })?;
+            let gain = if released[i] { 0.0 } else { SHAPE_GAIN };
+            if best.rms < (1.0 - gain) * here.rms {
+                released[i] = true;
+                *fit = best;
+            }
+        }
+        if fit.rms > 0.99 * round {
+            break;
+        }
+    }
+    Some(())
+}
+
+/// The fit with another history of record `r`, as good as it gets.
+fn with_history<'a>(
+    fit: &Fit<'a>,
+    r: usize,
+    (history, from): (History, f64),
+    steps: usize,
+) -> Option<Fit<'a>> {
+    let mut trial = fit.clone();
+    trial.restructure(|trial| trial.begins[r] = Beginning { history, from });
+    if history == History::Fitted {
+        for share in trial.layout().creep_weights() {
+            trial.x[share] = trial.x[share].max(FIRST_SHARE);
+        }
+    }
+    if steps == STEPS {
+        trial.settle(ROUGH)?;
+    } else {
+        trial.settle_rigid(steps)?;
+    }
+    Some(trial)
+}
+
+/// The voltage that the stage came from.
+fn fitted_history<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
+    let drive = fit.common.records[r].drive;
+    let (low, high) = range(drive.u);
+    let (first, reach) = (drive.u[0], high - low);
+    let parts = 16;
+    let mut best = with_history(fit, r, (History::Fitted, first), STEPS)?;
+    let mut width = 2.0 * reach / index(parts);
+    for i in 0..=parts {
+        let from = first - reach + width * index(i);
+        let trial = with_history(&best, r, (History::Fitted, from), FEW_STEPS)?;
+        if trial.rms < best.rms {
+            best = trial;
+        }
+    }
+    for _ in 0..7 {
+        width *= 0.5;
+        let from = best.begins[r].from;
+        for from in [from - width, from + width] {
+            let trial = with_history(&best, r, (History::Fitted, from), FEW_STEPS)?;
+            if trial.rms < best.rms {
+                best = trial;
+            }
+        }
+    }
+    best.settle(ROUGH)?;
+    Some(best)
+}
+
+/// The histories that were set, or the simplest ones that explain the records.
+fn choose_histories(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+    let open = fit.common.records.iter().any(|one| one.history.is_none());
+    if open && settings.creep == CreepKind::Auto {
+        // With creep, or what it does would be taken for a history.
+        let times = creeps(fit).pop().unwrap_or_default();
+        fit.restructure(|fit| fit.times = times);
+        fit.settle(ROUGH)?;
+    }
+    for r in 0..fit.common.records.len() {
+        choose_history(fit, settings, r)?;
+    }
+    Some(())
+}
+
+/// The history of one record.
+fn choose_history(fit: &mut Fit<'_>, settings: &Settings, r: usize) -> Option<()> {
+    let with_once = |fit: &mut Fit<'_>| {
+        if settings.nodes == NodesKind::Auto { add_once(fit, HISTORY_GAIN) } else { Some(()) }
+    };
+    match fit.common.records[r].history {
+        Some(History::Settled) => {}
+        Some(History::Virgin) => with_once(fit)?,
+        Some(History::Fitted) => {
+            *fit = fitted_history(fit, r)?;
+            with_once(fit)?;
+        }
+        None => {
+            let [virgin, fitted, settled] = side_by_side([
+                &|| {
+                    let mut virgin = fit.clone();
+                    with_once(&mut virgin)?;
+                    Some(virgin)
+                },
+                &|| {
+                    let mut fitted = fitted_history(fit, r)?;
+                    with_once(&mut fitted)?;
+                    Some(fitted)
+                },
+                &|| with_history(fit, r, (History::Settled, 0.0), STEPS),
+            ])?;
+            let other = if virgin.rms < fitted.rms { virgin } else { fitted };
+            for trial in [settled, other] {
+                let enough = (1.0 - HISTORY_GAIN) * fit.deviation_of(r);
+                if trial.rms < fit.rms && trial.deviation_of(r) < enough {
+                    *fit = trial;
+                }
+            }
+        }
+    }
+    Some(())
+}
+
+/// Dynamics, and creep anew beside them, which was chosen before a lag for some of which it stood.
+fn choose_dynamics_and_creep(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option<()> {
+    let still = &*fit;
+    let moving = || {
+        let mut moving = still.clone();
+        choose_dynamics(&mut moving, settings, mode)?;
+        Some(moving)
+    };
+    let (Some(gain), CreepKind::Auto, false) =
+        (fit.common.of.creep_gain(), &settings.creep, fit.times.is_empty())
+    else {
+        *fit = moving()?;
+        return Some(());
+    };
+    let bare = || {
+        let mut bare = without_creep(still.clone())?;
+        choose_dynamics(&mut bare, settings, mode)?;
+        Some(bare)
+    };
+    let [creeping, bare] = side_by_side([&moving, &bare])?;
+    *fit = if (1.0 - gain) * bare.rms <= creeping.rms { bare } else { creeping };
+    Some(())
+}
+
+/// Mode or lag where they are not set; the lags that explain the record as well are then in
+/// [`Fit::lags`].
+fn choose_dynamics(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option<()> {
+    match settings.dynamics {
+        DynamicsKind::None => {}
+        DynamicsKind::First => *fit = best_lag(fit)?,
+        DynamicsKind::Second if mode => {}
+        DynamicsKind::Second => *fit = unseen_mode(fit)?,
+        DynamicsKind::Auto => {
+            let mut still = fit.clone();
+            if mode {
+                still.set_poles(Form::None, &[]);
+                still.settle(ROUGH)?;
+                let lagging = best_lag(&still)?;
+                if fit.rms >= (1.0 - MODE_GAIN) * lagging.rms {
+                    *fit = smallest_lag(still, &lagging)?;
+                }
+                return Some(());
+            }
+            let [lagging, hidden] = side_by_side([&|| best_lag(&still), &|| unseen_mode(&still)])?;
+            if is_mode(&hidden) && hidden.rms < (1.0 - UNSEEN_GAIN) * lagging.rms {
+                *fit = hidden;
+            } else {
+                *fit = smallest_lag(still, &lagging)?;
+            }
+        }
+    }
+    Some(())
+}
+
+/// Whether what was found as a mode is one: far above the drive, where it does not stand for
+/// what else the record shows at the drive's harmonics.
+fn is_mode(fit: &Fit<'_>) -> bool {
+    let rates = fit.common.records.iter().map(|one| one.measures().frequency);
+    let drive = rates.fold(0.0, f64::max) / core::f64::consts::TAU;
+    let Some(slot) = fit.layout().poles().next() else { return false };
+    fit.poles_within() && libm::exp(fit.x[slot]) > ABOVE_DRIVE * drive
+}
+
+/// A mode that the record does not show: as high and as little damped as the record allows.
+fn unseen_mode<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
+    let dt = fit.common.shortest_interval();
+    let beginnings = [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)];
+    let trials = with_each(&beginnings, |(frequency, damping_ratio)| {
+        let mut trial = fit.clone();
+        trial.set_poles(Form::Modes(1), &[libm::log(frequency / dt), libm::log(*damping_ratio)]);
+        trial.settle_rigid(STEPS)?;
+        Some(trial)
+    })?;
+    let better =
+        |best: Fit<'a>, trial: Fit<'a>| if SAME * trial.rms < best.rms { trial } else { best };
+    let mut best = trials.into_iter().reduce(better)?;
+    best.settle(ROUGH)?;
+    Some(best)
+}
