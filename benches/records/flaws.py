@@ -91,7 +91,7 @@ KINDS: dict[str, Callable[[np.random.Generator, Array, Array, float], Reading]] 
 # named by a sentence that no kind describes it, where the record has no flaw.
 NAMED = {
     "none": r"no kind|cannot describe|does not fit",
-    "delay": r"delay|\blate\b|\blag\b",
+    "delay": r"delay|\blate\b|\blag\b(?! from 0 )",
     "drift": r"drift",
     "hum": r"\bhum\b|mains|[56]0(\.\d+)? Hz",
     "spikes": r"spike|outlier|far off|single reading|left out",
