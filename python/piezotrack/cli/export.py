@@ -92,7 +92,7 @@ def export_command(
             raise
         raise ParameterError(f"{error}; --name gives one") from None
     if single and to in ("json", "library"):
-        raise ParameterError(f"--float has no effect with --to {to}: expected it left out")
+        raise ParameterError("--float", f"no effect with --to {to}", "it left out", verb="has")
     if reference is None:
         refuse_without_effect(context, ("duration", "period"), "without --reference")
     known = load_controller(controller)

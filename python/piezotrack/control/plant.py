@@ -51,8 +51,9 @@ def plant_of(stage: Plant | IdentifiedModel) -> VirtualStage:
         return stage
     if not isinstance(stage, (Stage, IdentifiedModel)):
         raise ParameterError(
-            f"stage is {type(stage).__name__}: expected a pt.VirtualStage, a stage of a model, as "
-            "a pt.DahlStage, or an identified one"
+            "stage",
+            type(stage).__name__,
+            "a pt.VirtualStage, a stage of a model, as a pt.DahlStage, or an identified one",
         )
     return VirtualStage.of(stage)
 
@@ -88,8 +89,7 @@ def timing_on(plant: VirtualStage, timing: Timing | None, limits: tuple[float, f
     if plant.preconditioning is not None:
         if before:
             raise ParameterError(
-                f"voltages_before is {before}: expected none, this virtual stage has its "
-                "preconditioning"
+                "voltages_before", before, "none, this virtual stage has its preconditioning"
             )
         return given
     low, high = limits

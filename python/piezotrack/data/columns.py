@@ -144,12 +144,12 @@ class Columns(list[Column]):
         """
         units = {} if units is None else units
         if not isinstance(units, Mapping):
-            raise ParameterError(
-                f"units is {quoted(units)}: expected a mapping of columns to units"
-            )
+            raise ParameterError("units", quoted(units), "a mapping of columns to units")
         for key, unit in units.items():
             if not isinstance(unit, str):
-                raise ParameterError(f"units has {quoted(unit)} for {quoted(key)}: expected text")
+                raise ParameterError(
+                    "units", f"{quoted(unit)} for {quoted(key)}", "text", verb="has"
+                )
             if key not in QUANTITIES:
                 self._set_unit(self._find(key, "units"), unit)
         roles = {role: self._find(key, role) for role, key in wanted.items() if key is not None}

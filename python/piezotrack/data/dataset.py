@@ -122,7 +122,7 @@ class Dataset(Viewed):
         one_of("hold", hold, ("foh", "zoh"))
         for name, text in (("drive_unit", drive_unit), ("source", source or "")):
             if not isinstance(text, str):
-                raise ParameterError(f"{name} is {quoted(text)}: expected text")
+                raise ParameterError(name, quoted(text), "text")
         # The arrays hold the warm-up and the window, which begins at sample `_start`.
         self._u = signal_of("u", u)
         self._y = signal_of("y", y, like=self._u)

@@ -75,7 +75,7 @@ def save_log(log: Signals, path: str | os.PathLike[str]) -> Path:
     try:
         file = Path(path)
     except TypeError:
-        raise ParameterError(f"path is {quoted(path)}: expected the name of a file") from None
+        raise ParameterError("path", quoted(path), "the name of a file") from None
     known = format_to_write(file)
     columns = [
         WrittenColumn("time", "s", log.t, "time_s"),

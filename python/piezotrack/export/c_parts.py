@@ -82,14 +82,12 @@ def feedforward_table(
     """
     if given is not None:
         if reference is not None:
-            raise ParameterError("reference is given beside table: expected one of them")
+            raise ParameterError("reference", "given beside table", "one of them")
         return _given_table(controller, given)
     if reference is None:
         return None
     if controller.feedforward is None:
-        raise ParameterError(
-            "reference is given, but the controller has no feedforward: expected none"
-        )
+        raise ParameterError("reference", "given, but the controller has no feedforward", "none")
     if reference.period is None:
         raise ParameterError(
             f"reference ({reference.name}) does not repeat: expected one that does, for its table"
@@ -110,7 +108,7 @@ def _given_table(controller: Controller, given: ArrayLike) -> list[float]:
     table = signal_of("table", given)
     low, high = controller.limits
     if not 1 <= table.size <= MOST_SAMPLES:
-        raise ShapeError(f"table has {table.size} samples: expected 1 to {MOST_SAMPLES}")
+        raise ShapeError("table", f"{table.size} samples", f"1 to {MOST_SAMPLES}")
     far = np.flatnonzero((table < low) | (table > high))
     if far.size:
         unit = controller.drive_unit
@@ -178,9 +176,10 @@ def _check_online(controller: Controller) -> None:
     else:
         return
     raise ParameterError(
-        f"feedforward is {what}, which has no form in C sample by sample: expected "
-        "reference=, a motion that repeats, whose table is written, a Dahl stage without creep, or "
-        "to='library', which has all"
+        "feedforward",
+        f"{what}, which has no form in C sample by sample",
+        "reference=, a motion that repeats, whose table is written, a Dahl stage without "
+        "creep, or to='library', which has all",
     )
 
 

@@ -87,8 +87,9 @@ def compiler() -> list[str]:
     asked = os.environ.get("CC", "").split()
     if asked and shutil.which(asked[0]) is None:
         raise ParameterError(
-            f"CC is {quoted(asked[0])}, which cannot be run: expected the name of a C compiler, or "
-            "no CC in the environment"
+            "CC",
+            f"{quoted(asked[0])}, which cannot be run",
+            "the name of a C compiler, or no CC in the environment",
         )
     if asked:
         return asked

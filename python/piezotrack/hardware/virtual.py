@@ -75,8 +75,9 @@ class VirtualDevice:
     ) -> None:
         if not isinstance(stage, VirtualStage):
             raise ParameterError(
-                f"stage is {type(stage).__name__}: expected pt.VirtualStage, as VirtualStage.of "
-                "makes one of any model"
+                "stage",
+                type(stage).__name__,
+                "pt.VirtualStage, as VirtualStage.of makes one of any model",
             )
         self._limits = ordered("limits", stage.amplifier.limits if limits is None else limits)
         self._rates, self._memory = rates, _core.as_count("memory", memory)
@@ -174,7 +175,7 @@ def from_address(
 ) -> VirtualDevice:
     """Make the virtual stage of an address: ``virtual:`` or ``virtual:MODEL.json``."""
     if host or port or options:
-        raise ParameterError("device is a virtual stage: expected virtual: or virtual:MODEL.json")
+        raise ParameterError("device", "a virtual stage", "virtual: or virtual:MODEL.json")
     stage, limits = virtual_stage(path or None)
     return VirtualDevice(stage, limits=limits)
 

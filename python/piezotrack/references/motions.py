@@ -49,7 +49,7 @@ def _times(t: object) -> Array:
     """Check times [s]: numbers that are finite, and whose squares are."""
     times = real_array("t", t)
     if not (np.abs(times) < LARGEST).all():
-        raise ParameterError(f"t is {quoted(t)}: expected times in s, below {LARGEST:g} s")
+        raise ParameterError("t", quoted(t), f"times in s, below {LARGEST:g} s")
     return times
 
 

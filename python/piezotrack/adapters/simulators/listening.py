@@ -21,7 +21,7 @@ def checked_port(port: int) -> int:
     """
     port = _core.as_count("port", port)
     if port > 65535:
-        raise ParameterError(f"port is {port}: expected 0 to 65535")
+        raise ParameterError("port", port, "0 to 65535")
     return port
 
 

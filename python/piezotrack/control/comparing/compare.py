@@ -128,9 +128,7 @@ def compare_controllers(
     plant = plant_of(stage)
     low, high = number_pair("limits", limits, "V")
     if not isinstance(model, (Stage, IdentifiedModel)):
-        raise ParameterError(
-            f"model is {type(model).__name__}: expected a stage or identified model"
-        )
+        raise ParameterError("model", type(model).__name__, "a stage or identified model")
     interval = check_dt(dt)
     timing = timing_on(plant, timing, (low, high))
     check_delay(plant, timing.delay, interval)
@@ -170,7 +168,7 @@ def compare_controllers(
 
 def _counted(seeds: int) -> int:
     if not 1 <= _core.as_count("seeds", seeds) <= 100:
-        raise ParameterError(f"seeds is {seeds}: expected 1 to 100")
+        raise ParameterError("seeds", seeds, "1 to 100")
     return seeds
 
 
@@ -178,9 +176,9 @@ def _references(given: Sequence[Reference] | None) -> list[Reference]:
     listed = [] if given is None else list(given)
     for one in listed:
         if not isinstance(one, Reference):
-            raise ParameterError(f"references has {type(one).__name__}: expected pt.Reference")
+            raise ParameterError("references", type(one).__name__, "pt.Reference", verb="has")
     if given is not None and not listed:
-        raise ParameterError("references is empty: expected one or more")
+        raise ParameterError("references", "empty", "one or more")
     return listed
 
 
@@ -189,7 +187,7 @@ def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
         for i, one in enumerate(controllers):
             one_of(f"controllers[{i}]", one, CONTENDERS)
         if not controllers:
-            raise ParameterError("controllers is empty: expected one or more")
+            raise ParameterError("controllers", "empty", "one or more")
         return list(controllers)
     missing = set()
     if task.record is None:

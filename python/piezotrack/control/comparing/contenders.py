@@ -144,7 +144,7 @@ def _other(name: str) -> Maker:
 
 def _network(task: Task) -> list[Entry | None]:
     if task.record is None:
-        raise ParameterError("record is missing: expected one to train the network with")
+        raise ParameterError("record", "missing", "one to train the network with")
     return task.each(task.alone(train_network(task.record)))
 
 
@@ -164,7 +164,7 @@ def _observed(task: Task) -> list[Entry | None]:
     model = task.models["dahl"]
     stage = model if isinstance(model, DahlStage) else getattr(model, "model", None)
     if not isinstance(stage, DahlStage):
-        raise ParameterError("models['dahl'] is no Dahl stage: expected one to observe")
+        raise ParameterError("models['dahl']", "no Dahl stage", "one to observe")
     tuned = task.tuned(inverse=None)
     tuned_pid: Any = tuned.feedback
     plants = plants_of([task.stage], task.limits, task.timing.delay, task.spread)

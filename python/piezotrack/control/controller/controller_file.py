@@ -48,8 +48,9 @@ def inverse_entry(inverse: Inverse | None, drive: str) -> dict[str, Any] | None:
         return entry | {"kind": "network", "numbers": numbers} | errors
     if type(inverse) is not Inverse:
         raise ParameterError(
-            f"feedforward is {type(inverse).__name__}: expected pt.Inverse or "
-            "pt.control.NetworkInverse, which a file can hold"
+            "feedforward",
+            type(inverse).__name__,
+            "pt.Inverse or pt.control.NetworkInverse, which a file can hold",
         )
     return entry
 

@@ -64,11 +64,14 @@ class DisturbanceObserver(FeedbackLaw):
 
     def __post_init__(self) -> None:
         if not isinstance(self.pid, Pid):
-            raise ParameterError(f"pid is {type(self.pid).__name__}: expected pt.Pid")
+            raise ParameterError("pid", type(self.pid).__name__, "pt.Pid")
         if math.isinf(self.pid.ti):
             raise ParameterError(
-                "pid has ti = inf: expected a finite integral time, since the observer would keep "
-                "the constant that an incremental PID starts with"
+                "pid",
+                "ti = inf",
+                "a finite integral time, since the observer would keep the constant that an "
+                "incremental PID starts with",
+                verb="has",
             )
         check_nominal(self.plant_gain, self.plant_time, self.cutoff)
 
@@ -76,9 +79,9 @@ class DisturbanceObserver(FeedbackLaw):
 def check_nominal(gain: float, time: float, cutoff: float) -> None:
     """Refuse a nominal plant or a cutoff that is out of its range."""
     if finite("plant_gain", gain, "m/V") == 0.0:
-        raise ParameterError("plant_gain is 0 m/V: expected a gain other than 0")
+        raise ParameterError("plant_gain", "0 m/V", "a gain other than 0")
     not_negative("plant_time", time, "s")
     if not (_core.as_number("cutoff", cutoff) > 0.0):
         raise ParameterError(
-            f"cutoff is {cutoff} Hz: expected a frequency above 0, or infinity for no filter"
+            "cutoff", f"{cutoff} Hz", "a frequency above 0, or infinity for no filter"
         )

@@ -73,16 +73,19 @@ class HysteresisObserver(FeedbackLaw):
     def __post_init__(self) -> None:
         if not isinstance(self.stage, (DahlStage, BoucWenStage)):
             raise ParameterError(
-                f"stage is {type(self.stage).__name__}: expected pt.DahlStage or pt.BoucWenStage"
+                "stage", type(self.stage).__name__, "pt.DahlStage or pt.BoucWenStage"
             )
         if isinstance(self.stage, DahlStage) and self.stage.b0 != 0.0:
             raise ParameterError(
-                f"stage has b0 = {self.stage.b0:g} N/m: expected 0, as dry friction is not observed"
+                "stage",
+                f"b0 = {self.stage.b0:g} N/m",
+                "0, as dry friction is not observed",
+                verb="has",
             )
         if not isinstance(self.pid, Pid):
-            raise ParameterError(f"pid is {type(self.pid).__name__}: expected pt.Pid")
+            raise ParameterError("pid", type(self.pid).__name__, "pt.Pid")
         if not 0.0 <= finite("correction", self.correction, "") <= 1.0:
-            raise ParameterError(f"correction is {self.correction}: expected a share from 0 to 1")
+            raise ParameterError("correction", self.correction, "a share from 0 to 1")
         positive("stroke", self.stroke, "m")
 
     @property

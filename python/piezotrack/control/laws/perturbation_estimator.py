@@ -55,7 +55,5 @@ class PerturbationEstimator(FeedbackLaw):
 
     def __post_init__(self) -> None:
         if not isinstance(self.sliding, SlidingMode):
-            raise ParameterError(
-                f"sliding is {type(self.sliding).__name__}: expected pt.control.SlidingMode"
-            )
+            raise ParameterError("sliding", type(self.sliding).__name__, "pt.control.SlidingMode")
         check_nominal(self.plant_gain, self.plant_time, self.cutoff)

@@ -58,11 +58,11 @@ class Pid(FeedbackLaw):
         finite("kp", self.kp, "V/m")
         if not (_core.as_number("ti", self.ti) > 0.0):
             raise ParameterError(
-                f"ti is {self.ti} s: expected a time above 0, or infinity for no integral part"
+                "ti", f"{self.ti} s", "a time above 0, or infinity for no integral part"
             )
         not_negative("td", self.td, "s")
         if self.tt is not None and not (_core.as_number("tt", self.tt) > 0.0):
-            raise ParameterError(f"tt is {self.tt} s: expected a time above 0")
+            raise ParameterError("tt", f"{self.tt} s", "a time above 0")
 
     @property
     def _pid(self) -> Pid:

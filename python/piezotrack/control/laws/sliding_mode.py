@@ -66,7 +66,7 @@ class SlidingMode(FeedbackLaw):
         positive("layer", self.layer, "m")
         if not (_core.as_number("ti", self.ti) > 0.0):
             raise ParameterError(
-                f"ti is {self.ti} s: expected a time above 0, or infinity for no integral"
+                "ti", f"{self.ti} s", "a time above 0, or infinity for no integral"
             )
         not_negative("td", self.td, "s")
         not_negative("tf", self.tf, "s")

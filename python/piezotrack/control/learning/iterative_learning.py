@@ -168,17 +168,16 @@ class IterativeLearning:
         edge = None if cutoff is None else positive("cutoff", cutoff, "Hz")
         if edge is not None and not 1e-6 * rate <= edge <= rate:
             raise ParameterError(
-                f"cutoff is {edge:g} Hz: expected {1e-6 * rate:g} to {rate:g} Hz, half the "
-                "sampling rate"
+                "cutoff", f"{edge:g} Hz", f"{1e-6 * rate:g} to {rate:g} Hz, half the sampling rate"
             )
         step = positive("gain", gain, "parts of 1")
         if step >= 2.0:
-            raise ParameterError(f"gain is {step:g}: expected below 2")
+            raise ParameterError("gain", f"{step:g}", "below 2")
         # The noise of earlier trials is in the table: gain^2 (1 + (1 - gain)^2 + ...) of it.
         self._only_noise = ABOVE_NOISE * float(np.sqrt(2.0 / (2.0 - step)))
         kept = in_range("forgetting_factor", forgetting_factor, 1.0, "parts of 1")
         if kept == 0.0:
-            raise ParameterError("forgetting_factor is 0: expected above 0, at most 1")
+            raise ParameterError("forgetting_factor", "0", "above 0, at most 1")
         self._rule: Rule
         if method == "frequency":
             self._rule = frequency_rule(
@@ -343,7 +342,7 @@ class IterativeLearning:
             dt = self._controller.dt
             for one in measured:
                 if not isinstance(one, Dataset):
-                    raise ParameterError(f"measured has {quoted(one)}: expected records only")
+                    raise ParameterError("measured", quoted(one), "records only", verb="has")
                 if abs(one.dt - dt) > 1e-6 * dt:
                     raise DataError(
                         f"measured has a sampling interval of {one.dt:g} s: expected that of the "
@@ -357,8 +356,9 @@ class IterativeLearning:
         count = self._t.size
         if records.ndim != 2 or records.shape[1] != count or records.shape[0] < 1:
             raise ShapeError(
-                f"measured has the shape {records.shape}: expected ({count},) or "
-                f"(records, {count}), the samples of a trial"
+                "measured",
+                f"the shape {records.shape}",
+                f"({count},) or (records, {count}), the samples of a trial",
             )
         wrong = np.argwhere(~(np.abs(records) < 1.0))
         if wrong.size:
@@ -378,13 +378,13 @@ def _check_kinds(
         ("reference", reference, Reference),
     ):
         if not isinstance(value, kind):
-            raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+            raise ParameterError(name, type(value).__name__, f"pt.{kind.__name__}")
     if controller.repetitive is not None:
         raise ParameterError(
-            "controller has a repetitive part, which learns too: expected one without"
+            "controller", "a repetitive part, which learns too", "one without", verb="has"
         )
     if not isinstance(models, Sequence):
-        raise ParameterError(f"models is {type(models).__name__}: expected a list of models")
+        raise ParameterError("models", type(models).__name__, "a list of models")
 
 
 def one_trial(reference: Reference, method: Method, dt: float) -> Reference:
@@ -399,8 +399,9 @@ def one_trial(reference: Reference, method: Method, dt: float) -> Reference:
     turn = reference.period / dt
     if abs(turn - round(turn)) > 1e-6 or round(turn) < 8:
         raise ParameterError(
-            f"dt is {dt:g} s: expected a whole number of samples in the period, "
-            f"{reference.period:g} s, and 8 or more"
+            "dt",
+            f"{dt:g} s",
+            f"a whole number of samples in the period, {reference.period:g} s, and 8 or more",
         )
     return replace(reference, ramp=0.0, origin=None, duration=reference.period)
 

@@ -382,9 +382,9 @@ def contour(
     True
     """
     if not isinstance(stage, XYStage):
-        raise ParameterError(f"stage is {type(stage).__name__}: expected pt.XYStage")
+        raise ParameterError("stage", type(stage).__name__, "pt.XYStage")
     if not isinstance(path, XYReference):
-        raise ParameterError(f"path is {type(path).__name__}: expected pt.XYReference")
+        raise ParameterError("path", type(path).__name__, "pt.XYReference")
     both = _two(controllers)
     substeps = _core.as_count("substeps", substeps)
     free = {
@@ -470,7 +470,7 @@ def workspace(
     60 um
     """
     if not isinstance(stage, XYStage):
-        raise ParameterError(f"stage is {type(stage).__name__}: expected pt.XYStage")
+        raise ParameterError("stage", type(stage).__name__, "pt.XYStage")
     alone = np.ndim(limits[0]) == 0
     pairs = [number_pair("limits", one, "V") for one in ([limits] * 2 if alone else limits)]
     axes = list(zip((stage.x, stage.y), pairs, strict=True))
@@ -485,10 +485,10 @@ def _two(controllers: Sequence[Controller]) -> tuple[Controller, Controller]:
     both = [one for one in given if isinstance(one, Controller)]
     if not len(given) == len(both) == 2:
         kinds = ", ".join(type(one).__name__ for one in given) or type(controllers).__name__
-        raise ParameterError(f"controllers are {kinds}: expected two pt.Controller, for x and y")
+        raise ParameterError("controllers", kinds, "two pt.Controller, for x and y", verb="are")
     x, y = both
     if x.dt != y.dt:
-        raise ParameterError(f"dt of y is {y.dt:g} s: expected that of x, {x.dt:g} s")
+        raise ParameterError("dt of y", f"{y.dt:g} s", f"that of x, {x.dt:g} s")
     return x, y
 
 
@@ -501,5 +501,5 @@ def _runs(both: tuple[Controller, Controller], path: XYReference) -> tuple[Run, 
 def _inverse(matrix: ArrayLike) -> Array:
     rows = square_matrix("decoupling", matrix)
     if abs(float(np.linalg.det(rows))) < 1e-3:
-        raise ParameterError(f"decoupling is {rows.tolist()}: expected a matrix near unity")
+        raise ParameterError("decoupling", rows.tolist(), "a matrix near unity")
     return np.asarray(np.linalg.inv(rows), dtype=np.float64)

@@ -189,5 +189,5 @@ def _number(place: str, value: Any) -> float | None:
     if value == INFINITE:
         return math.inf
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ParameterError(f"{place} is {quoted(value)}: expected a number, or 'inf'")
+        raise ParameterError(place, quoted(value), "a number, or 'inf'")
     return float(value)

@@ -80,7 +80,7 @@ def to_control(
             )
         return _feedback_law(part, dt)
     if not isinstance(part, (VirtualStage, Stage, IdentifiedModel)):
-        raise ParameterError(f"part is {type(part).__name__}: expected a stage or a controller")
+        raise ParameterError("part", type(part).__name__, "a stage or a controller")
     return _stage(part, limits, gain, dt, not_negative("delay", delay, "s"))
 
 
@@ -102,7 +102,7 @@ def _stage(
     if limits is None and isinstance(stage, IdentifiedModel):
         limits = stage.drive_range
     if limits is None:
-        raise ParameterError("limits are missing: expected (low, high) in V")
+        raise ParameterError("limits", "missing", "(low, high) in V", verb="are")
     low, high = number_pair("limits", limits, "V")
     one_of("gain", gain, CASES)
     plant = plant_of(stage)
@@ -183,12 +183,12 @@ def _feedback_law(part: Controller | FeedbackLaw, dt: float | None) -> Any:
     law: Any = part
     if isinstance(part, Controller):
         if dt is not None:
-            raise ParameterError(f"dt is {dt}: expected none, the controller has its own")
+            raise ParameterError("dt", dt, "none, the controller has its own")
         law, dt = part.feedback, part.dt
         if law is None:
-            raise ParameterError("part is a controller without feedback: expected one with it")
+            raise ParameterError("part", "a controller without feedback", "one with it")
     if dt is None:
-        raise ParameterError("dt is missing: expected the sampling interval of the loop in s")
+        raise ParameterError("dt", "missing", "the sampling interval of the loop in s")
     dt = check_dt(dt)
     control = _control()
     labels = {"inputs": ["error_m"], "outputs": ["voltage_V"]}

@@ -190,8 +190,7 @@ def problem_of(title: str, given: object, data: Dataset) -> tuple[Problem, Metho
         methods = MethodChoice.of(given.get("method"), None if model == AUTO else problem.info)
         if methods.search.seed:
             raise ParameterError(
-                f"method has the seed {methods.search.seed}: expected it in seeds=",
-                argument="method",
+                "method", f"the seed {methods.search.seed}", "it in seeds=", verb="has"
             )
     except ParameterError as error:
         raise ParameterError(f"models: '{title}': {error}", argument="models") from None

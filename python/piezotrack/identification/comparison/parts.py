@@ -46,8 +46,10 @@ def parts_of(log: Dataset, train: object, test: object) -> tuple[Dataset, Datase
     elif train is None:
         if second[0] is None:
             raise ParameterError(
-                "test begins with the record, which leaves nothing to fit: expected a later "
-                "beginning, or train="
+                "test",
+                "the record, which leaves nothing to fit",
+                "a later beginning, or train=",
+                verb="begins with",
             )
         first = (None, second[0])
     elif test is None:
@@ -82,7 +84,7 @@ def _bounds(name: str, window: object) -> Window:
     if len(ends) != 2:
         what = f"{window!r}" if isinstance(window, (tuple, list, str)) else type(window).__name__
         other = " or a Dataset" if name == "test" else ""
-        raise ParameterError(f"{name} is {what}: expected (start, stop) in seconds{other}")
+        raise ParameterError(name, what, f"(start, stop) in seconds{other}")
     return ends[0], ends[1]
 
 

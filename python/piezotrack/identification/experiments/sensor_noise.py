@@ -239,7 +239,7 @@ def identify_noise(log: Dataset) -> Noise:
     0.097 um rms in steps of 0.038 um
     """
     if not isinstance(log, Dataset):
-        raise ParameterError(f"log is {type(log).__name__}: expected pt.Dataset")
+        raise ParameterError("log", type(log).__name__, "pt.Dataset")
     if np.ptp(log.u) > 0.0 and np.ptp(log.y) > 0.0:
         alike = float(np.corrcoef(log.u, log.y)[0, 1])
         if abs(alike) > FOLLOWS:

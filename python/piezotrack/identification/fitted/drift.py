@@ -149,7 +149,7 @@ def time_constant(name: str, value: object) -> float:
     """Check the time constant of a drift [s]."""
     time = positive(name, value, "s")
     if time < SHORTEST:
-        raise ParameterError(f"{name} is {time:g} s: expected {SHORTEST:g} s or more")
+        raise ParameterError(name, f"{time:g} s", f"{SHORTEST:g} s or more")
     return time
 
 

@@ -154,7 +154,7 @@ def records_of_file(entries: Any, state: type[StageState]) -> tuple[FittedRecord
     if entries is None:
         return ()
     if not isinstance(entries, list):
-        raise ParameterError(f"records is {type(entries).__name__}: expected a list of records")
+        raise ParameterError("records", type(entries).__name__, "a list of records")
     return tuple(_record(f"records[{i}]", one, state) for i, one in enumerate(entries))
 
 

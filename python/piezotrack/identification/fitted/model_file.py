@@ -249,7 +249,7 @@ def read_content(path: str | os.PathLike[str]) -> tuple[str, Any]:
     try:
         file = Path(path)
     except TypeError:
-        raise ParameterError(f"path is {path!r}: expected the name of a file") from None
+        raise ParameterError("path", f"{path!r}", "the name of a file") from None
     try:
         content = file.read_bytes()
     except OSError as error:

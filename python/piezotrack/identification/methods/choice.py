@@ -69,16 +69,15 @@ class MethodChoice:
             place = "weights" if isinstance(checked, LeastSquares) else "search"
             if place in found:
                 raise ParameterError(
-                    f"method is {quoted(method)}: expected one that searches, and one LeastSquares",
-                    argument="method",
+                    "method", quoted(method), "one that searches, and one LeastSquares"
                 )
             found[place] = checked
         if found and info is not None and ("search" if info.searched else "weights") not in found:
             how = "are searched" if info.searched else "follow by least squares"
             raise ParameterError(
-                f"method is {quoted(method)}: expected another one with the model '{info.name}', "
-                f"whose parameters {how}",
-                argument="method",
+                "method",
+                quoted(method),
+                f"another one with the model '{info.name}', whose parameters {how}",
             )
         return cls(**found)
 

@@ -90,15 +90,15 @@ def posterior_models(
     True
     """
     if not isinstance(model, IdentifiedModel):
-        raise ParameterError(f"model is {type(model).__name__}: expected a pt.IdentifiedModel")
+        raise ParameterError("model", type(model).__name__, "a pt.IdentifiedModel")
     if not isinstance(data, Dataset):
-        raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
+        raise ParameterError("data", type(data).__name__, "a Dataset")
     positive("deviations", deviations, "")
     values = _fitted(model)
     if not values:
-        raise ParameterError("model has no values that were fitted: expected an identified one")
+        raise ParameterError("model", "no values that were fitted", "an identified one", verb="has")
     if len(data.t) < 2 * PARTS:
-        raise ParameterError(f"data has {len(data.t)} samples: expected {2 * PARTS} or more")
+        raise ParameterError("data", f"{len(data.t)} samples", f"{2 * PARTS} or more", verb="has")
     begins = _Beginning(model, data)
     columns = np.column_stack([begins.sensitivity(value) for value in values])
     axes = _axes(columns, begins.residual(model))

@@ -126,9 +126,7 @@ def _places(settings: LeastSquares, info: ModelInfo) -> list[float] | None:
     places = None
     for name, given in (("thresholds", settings.thresholds), ("levels", settings.levels)):
         if given is not None and name != info.places:
-            raise ParameterError(
-                f"{name} is {quoted(given)}: expected None, as {info.title} has no {name}"
-            )
+            raise ParameterError(name, quoted(given), f"None, as {info.title} has no {name}")
         places = places if given is None else list(given)
     return places
 

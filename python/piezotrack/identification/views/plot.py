@@ -64,7 +64,7 @@ def _check(data: Dataset, run: Response) -> None:
     expect("data", data, Dataset, "a Dataset")
     expect("run", run, Response, "what simulate returns")
     if run.x.size != data.y.size:
-        raise ShapeError(f"run has {run.x.size} samples: expected {data.y.size}, as the record")
+        raise ShapeError("run", f"{run.x.size} samples", f"{data.y.size}, as the record")
 
 
 def plot_loop(
@@ -332,7 +332,7 @@ def _shown(model: IdentifiedModel, data: Dataset | None) -> tuple[Dataset, Respo
     if data is not None:
         return data, model.simulate(data)
     if not isinstance(model, Identification):
-        raise ParameterError("data is None: expected a record, as a model from a file has none")
+        raise ParameterError("data", "None", "a record, as a model from a file has none")
     return model.data, model.simulate(model.data, offset=model.offset)
 
 

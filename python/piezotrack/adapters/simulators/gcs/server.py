@@ -77,15 +77,16 @@ class GcsServer:
     ) -> None:
         if not isinstance(stage, VirtualStage):
             raise ParameterError(
-                f"stage is {type(stage).__name__}: expected pt.VirtualStage, as VirtualStage.of "
-                "makes one of any model"
+                "stage",
+                type(stage).__name__,
+                "pt.VirtualStage, as VirtualStage.of makes one of any model",
             )
         within = ordered("limits", stage.amplifier.limits if limits is None else limits)
         port = checked_port(port)
         speed = _core.as_number("speed", speed)
         if not 0.0 < speed <= FASTEST:
             raise ParameterError(
-                f"speed is {speed:g}: expected above 0, and up to {FASTEST:g} times real time"
+                "speed", f"{speed:g}", f"above 0, and up to {FASTEST:g} times real time"
             )
         self._host, self._limits = host, within
         self._controller = VirtualController(stage, within, speed=speed)
