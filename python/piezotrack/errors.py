@@ -38,10 +38,24 @@ class PiezotrackError(Exception):
     def __init__(self, message: str = "") -> None:
         super().__init__(_printable(message))
 
-    def of(self, label: str) -> Self:
-        """Return the same error with a label before its sentence, as the name of a file."""
+    def of(self, label: str, **attributes: Any) -> Self:
+        """Return the same error with a label before its sentence, as the name of a file.
+
+        Parameters
+        ----------
+        label : str
+            Name of a file, or of one of several; the error stays as it is where it is empty.
+        **attributes : object
+            Attributes that it has in place of those of the error, as ``argument``.
+
+        Returns
+        -------
+        PiezotrackError
+            Of the same class.
+        """
         labelled = copy(self)
-        labelled.args = (_printable(f"{label}: {self}"),)
+        vars(labelled).update(attributes)
+        labelled.args = (_printable(f"{label}: {self}" if label else str(self)),)
         return labelled
 
 

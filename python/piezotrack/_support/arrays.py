@@ -117,7 +117,9 @@ def time_axis(t: ArrayLike | None, dt: float | None, u: Array) -> tuple[Array, f
     """Return the times of the samples of `u` and their interval [s], given either."""
     if (t is None) == (dt is None):
         given = "neither is" if t is None else "both are"
-        raise ParameterError(f"t and dt: expected exactly one of them, {given} given")
+        raise ParameterError(
+            f"t and dt: expected exactly one of them, {given} given", argument="dt"
+        )
     if t is None and dt is not None:
         interval = check_dt(dt)
         return signal_of("t", interval * np.arange(u.size)), interval

@@ -184,7 +184,8 @@ def require(text: str, *quantities: str) -> Unit:
     unit = lookup(text)
     if unit is None:
         raise ParameterError(
-            f"unknown unit {quoted(text)}: expected one of {known_units(*quantities)}"
+            f"unknown unit {quoted(text)}: expected one of {known_units(*quantities)}",
+            argument="units",
         )
     if quantities and unit.quantity not in quantities:
         raise ParameterError(

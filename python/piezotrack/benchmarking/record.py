@@ -106,8 +106,10 @@ class BenchmarkRecord:
                 raise ParameterError(part, type(data).__name__, "a Dataset")
             if data.drive_unit != self.fitted.drive_unit:
                 raise ParameterError(
-                    f"the drive of {part} is in {data.drive_unit}: expected "
-                    f"{self.fitted.drive_unit}, as that of the part fitted"
+                    part,
+                    f"a drive in {data.drive_unit}",
+                    f"{self.fitted.drive_unit}, as that of the part fitted",
+                    verb="has",
                 )
         if self.noise is not None:
             positive("noise", self.noise, "m")

@@ -90,7 +90,7 @@ def export_command(
     except ParameterError as error:
         if name is not None:
             raise
-        raise ParameterError(f"{error}; --name gives one") from None
+        raise ParameterError(f"{error}; --name gives one", argument="--name") from None
     if single and to in ("json", "library"):
         raise ParameterError("--float", f"no effect with --to {to}", "it left out", verb="has")
     if reference is None:

@@ -264,7 +264,7 @@ class Kinds:
             if name != AUTO:
                 model_named(name)
             if name in names[:i]:
-                raise ParameterError(f"--model names {name} twice: expected it once")
+                raise ParameterError("--model", f"{name} twice", "it once", verb="names")
         return cls(names)
 
     def refuse_without_effect(self, context: typer.Context) -> None:

@@ -172,7 +172,7 @@ def of_file(file: Path) -> Iterator[None]:
     try:
         yield
     except PiezotrackError as error:
-        raise type(error)(f"{file.name}: {error}") from None
+        raise error.of(file.name) from None
 
 
 def can_be_folder(out: Path) -> None:
@@ -223,7 +223,7 @@ def windowed(log: Dataset, file: Path, option: str, window: str | None) -> Datas
     try:
         return log[start:stop]
     except ParameterError as error:
-        raise ParameterError(f"{file.name}: {option} {window}: {error}") from None
+        raise error.of(f"{file.name}: {option} {window}") from None
 
 
 def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
@@ -234,7 +234,7 @@ def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
         if not equals or not name or not value:
             raise ParameterError(option, f"'{text}'", "NAME=VALUE")
         if name.strip() in dict(pairs):
-            raise ParameterError(f"{option} names {name.strip()} twice: expected it once")
+            raise ParameterError(option, f"{name.strip()} twice", "it once", verb="names")
         pairs.append((name.strip(), value.strip()))
     return pairs
 

@@ -168,7 +168,9 @@ class Columns(list[Column]):
                 roles[role] = self._only(found, role)
         roles = {role: roles[role] for role in wanted if role in roles}
         if len({column.index for column in roles.values()}) < len(roles):
-            raise ParameterError(f"{', '.join(roles)}: two of them are the same column")
+            raise ParameterError(
+                ", ".join(roles), "the same column twice", "different ones", verb="name"
+            )
         for role in roles:
             if role in units:
                 roles[role] = self._set_unit(roles[role], units[role])
@@ -210,7 +212,8 @@ class Columns(list[Column]):
         there = self._nearest(str(key), found or self)
         names = _titles(there) if self.has_titles else f"0 to {len(self) - 1}, without titles"
         those = "they" if found else "the columns"
-        raise ParameterError(f"{argument}: {quoted(key)} {problem}; {those} are {names}")
+        words = f"{argument}: {quoted(key)} {problem}; {those} are {names}"
+        raise ParameterError(words, argument=argument)
 
     def _nearest(self, key: str, columns: Sequence[Column]) -> Sequence[Column]:
         """Put the columns with names like `key` first, where a message cannot take all."""

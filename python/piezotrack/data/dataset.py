@@ -353,12 +353,14 @@ class Dataset(Viewed):
     def __getitem__(self, window: slice) -> Dataset:
         if not isinstance(window, slice):
             raise ParameterError(
-                f"{quoted(window)} is not a slice: a dataset is sliced in seconds, as in "
-                "log[3.0:23.0]; for single samples use log.u, log.y and log.t"
+                "window",
+                quoted(window),
+                "a slice in seconds, as in log[3.0:23.0]; for single samples use log.u, log.y and "
+                "log.t",
             )
         if window.step is not None:
             raise ParameterError(
-                f"the slice has a step of {quoted(window.step)}: expected log[start:stop], in s"
+                "window", f"a step of {quoted(window.step)}", "log[start:stop], in s", verb="has"
             )
         first, stop = self._samples(window.start, window.stop)
         return self._part(0, stop, start=first)

@@ -36,7 +36,7 @@ def decimation_factor(value: object, count: int) -> int:
     factor = _factor(value)
     if count < MIN_SAMPLES * factor:
         raise ParameterError(
-            f"factor is {quoted(factor)}: that leaves fewer than {MIN_SAMPLES} of {count} samples"
+            "factor", quoted(factor), f"one that leaves {MIN_SAMPLES} of {count} samples or more"
         )
     return factor
 
@@ -82,7 +82,8 @@ def further_columns(
         if name not in columns or not isinstance(name, str):
             known = listed(list(columns)) or "none"
             raise ParameterError(
-                f"{quoted(name)} is not the name of a column: the names are {known}"
+                f"{quoted(name)} is not the name of a column: the names are {known}",
+                argument="column_units" if name in units else "columns",
             )
     for name, unit in units.items():
         if not isinstance(unit, str):
@@ -106,11 +107,12 @@ def window_samples(t: Array, dt: float, start: float | None, stop: float | None)
     window = f"the window from {begin:.10g} s to {end:.10g} s"
     record = f"the record, whose samples go from {low:.10g} s to {float(t[-1]):.10g} s"
     if begin < low - dt / 2 or end > high + dt / 2:
-        raise ParameterError(f"{window} reaches out of {record}")
+        raise ParameterError(f"{window} reaches out of {record}", argument="window")
     if begin >= end:
-        raise ParameterError(window, "empty", f"start < stop within {record}")
+        expected = f"start < stop within {record}"
+        raise ParameterError(window, "empty", expected, argument="window")
     first, last = (int(np.searchsorted(t, bound - slack)) for bound in (begin, end))
     if last - first < MIN_SAMPLES:
         few = f"holds {last - first} samples: expected at least {MIN_SAMPLES}"
-        raise ParameterError(f"{window} {few}, within {record}")
+        raise ParameterError(f"{window} {few}, within {record}", argument="window")
     return first, last

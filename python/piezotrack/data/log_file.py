@@ -98,7 +98,8 @@ def format_to_write(file: Path) -> Format:
         if ending in known.endings:
             return known
     endings = ", ".join(known.endings[0] for known in written)
-    raise ParameterError(f"{file.name}: expected an ending of a format that is written: {endings}")
+    words = f"{file.name}: expected an ending of a format that is written: {endings}"
+    raise ParameterError(words, argument="path")
 
 
 def _drive(log: Signals) -> WrittenColumn:

@@ -90,13 +90,17 @@ def feedforward_table(
         raise ParameterError("reference", "given, but the controller has no feedforward", "none")
     if reference.period is None:
         raise ParameterError(
-            f"reference ({reference.name}) does not repeat: expected one that does, for its table"
+            "reference",
+            f"({reference.name}), which does not repeat",
+            "one that does, for its table",
         )
     samples = reference.period / controller.dt
     if abs(samples - round(samples)) > 1e-6:
         raise ParameterError(
-            f"reference ({reference.name}) has a period of {reference.period:g} s: expected a "
-            f"whole number of samples of {controller.dt:g} s, for its table"
+            f"reference ({reference.name})",
+            f"a period of {reference.period:g} s",
+            f"a whole number of samples of {controller.dt:g} s, for its table",
+            verb="has",
         )
     check_period(controller, reference)
     table = controller.feedforward.table(reference, controller.dt, limits=controller.limits)
@@ -158,9 +162,10 @@ def _law_of(controller: Controller) -> tuple[str, tuple[str, ...]]:
     if (stage := getattr(law, "stage", None)) is not None:
         what += f" of a {stage.info.title} stage"
     raise ParameterError(
-        f"feedback is a {what}, which has no form in C: its step needs powers or logarithms; "
-        "expected a PID, state space, lead-lag, sliding mode, a disturbance observer or the "
-        "hysteresis observer of a Dahl stage, or to='library', which has all"
+        "feedback",
+        f"a {what}, which has no form in C, as its step needs powers or logarithms",
+        "a PID, state space, lead-lag, sliding mode, a disturbance observer or the "
+        "hysteresis observer of a Dahl stage, or to='library', which has all",
     )
 
 

@@ -82,7 +82,8 @@ def compiler() -> list[str]:
     if (system, machine) != ("Linux", "x86_64"):
         raise ParameterError(
             f"a unit has a binary for Linux, x86-64, which is not compiled on {system}, {machine}: "
-            "expected to='c99', whose sources every machine compiles"
+            "expected to='c99', whose sources every machine compiles",
+            argument="to",
         )
     asked = os.environ.get("CC", "").split()
     if asked and shutil.which(asked[0]) is None:
@@ -98,7 +99,8 @@ def compiler() -> list[str]:
             return [found]
     raise ParameterError(
         "no C compiler was found for the binary of the unit: expected gcc, cc or clang, or CC= in "
-        "the environment"
+        "the environment",
+        argument="to",
     )
 
 

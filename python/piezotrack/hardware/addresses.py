@@ -66,7 +66,7 @@ def connect(address: str) -> Device:
         parts = urlsplit(address)
         host, port = parts.hostname, parts.port
     except ValueError as error:
-        raise ParameterError(f"device is {quoted(address)}: {error}") from None
+        raise ParameterError("device", quoted(address), f"an address ({error})") from None
     named = [entry for entry in _entries() if entry.name == parts.scheme]
     if not named:
         raise ParameterError("device", quoted(address), f"an address, one of {known}")

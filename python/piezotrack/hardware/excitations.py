@@ -100,8 +100,10 @@ class Drive:
         count = self.count(dt)
         if self.frequency is not None and 2.0 * self.frequency * dt > 1.0 + 1e-9:
             raise ParameterError(
-                f"drive ({self.name}) goes up to {plain(self.frequency)} Hz: expected at most half "
-                f"the rate, {plain(0.5 / dt)} Hz"
+                f"drive ({self.name})",
+                f"up to {plain(self.frequency)} Hz",
+                f"at most half the rate, {plain(0.5 / dt)} Hz",
+                verb="goes",
             )
         volts = np.asarray(self.at(dt * np.arange(count, dtype=np.float64)), dtype=np.float64)
         return np.broadcast_to(volts, (count,)).copy()

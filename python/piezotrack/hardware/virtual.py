@@ -207,7 +207,6 @@ def virtual_stage(path: str | Path | None) -> tuple[VirtualStage, tuple[float, f
     known = load(path)
     if known.drive_unit != "V":
         raise ParameterError(
-            f"device {path}: its drive is in {known.drive_unit}: expected a stage that a voltage "
-            "drives"
+            f"device {path}", f"driven in {known.drive_unit}", "a stage that a voltage drives"
         )
     return VirtualStage.of(known), known.drive_range

@@ -292,7 +292,8 @@ def extremes(
     if not periods * cosines <= MOST_PERIODS:
         raise ParameterError(
             f"the motion has {periods:.3g} of its shortest periods, {shortest:g} s, in "
-            f"{duration:g} s: expected at most {MOST_PERIODS // cosines} to find its range"
+            f"{duration:g} s: expected at most {MOST_PERIODS // cosines} to find its range",
+            argument="duration",
         )
     with np.errstate(all="ignore"):
         return _extremes(motion, duration, shortest / POINTS)

@@ -181,7 +181,7 @@ def made_from_text(
         raise ParameterError(what, quoted(text), f"a file or one of {examples}")
     if len(text) > MOST_LETTERS:
         raise ParameterError(
-            f"{what} {quoted(text)} has {len(text)} letters: expected {MOST_LETTERS} at most"
+            f"{what} {quoted(text)}", f"{len(text)} letters", f"{MOST_LETTERS} at most", verb="has"
         )
     name, colon, rest = (part.strip() for part in text.partition(":"))
     kind = kinds.get(name.lower())
@@ -192,8 +192,9 @@ def made_from_text(
         if is_there or (is_path and Path(text).suffix):
             return read(text, duration=duration)
         raise ParameterError(
-            f"{what} {quoted(text)} is neither a file nor a known kind: expected a file or one of "
-            f"{examples}"
+            f"{what} {quoted(text)}",
+            "neither a file nor a known kind",
+            f"a file or one of {examples}",
         )
     try:
         values = {**others, **_values(kind, rest)}
@@ -206,7 +207,7 @@ def made_from_text(
             raise ParameterError(f"there is no {called}: {kind.expected}")
         return kind.make(**values)
     except ParameterError as error:
-        raise ParameterError(f"{what} {quoted(text)}: {error}") from None
+        raise error.of(f"{what} {quoted(text)}", argument=what) from None
 
 
 def _values(kind: Kind, text: str) -> dict[str, Any]:

@@ -225,8 +225,10 @@ class Reference:
             x = v = a = np.zeros(0)
         if not (x.shape == v.shape == a.shape == t.shape):
             raise ParameterError(
-                f"motion of {self.name} returns {quoted(parts)} for times of the shape {t.shape}: "
-                "expected displacement, velocity and acceleration, each of that shape"
+                f"motion of {self.name}",
+                f"{quoted(parts)} for times of the shape {t.shape}",
+                "displacement, velocity and acceleration, each of that shape",
+                verb="returns",
             )
         return x, v, a
 
@@ -449,4 +451,4 @@ def read_reference(
             record.y, record.dt, period=period, duration=duration, ramp=ramp, name=name
         )
     except (DataError, ParameterError) as error:
-        raise type(error)(f"{name}: {error}") from None
+        raise error.of(name) from None

@@ -220,7 +220,8 @@ def staircase(
     if (steps is None) == (levels is None):
         raise ParameterError(
             "steps and levels: expected exactly one of them, "
-            f"{'neither is' if steps is None else 'both are'} given"
+            f"{'neither is' if steps is None else 'both are'} given",
+            argument="steps",
         )
     if levels is None:
         count = _core.as_count("steps", steps)
@@ -233,7 +234,7 @@ def staircase(
         period, record = 2 * count * (dwell + rise), 2 * count * (dwell + rise)
     else:
         if low is not None or high is not None:
-            raise ParameterError("low and high come with steps: expected levels without them")
+            raise ParameterError("low or high", "given", "levels without them")
         places = numbers("levels", levels, "m", least=2)
         low, high = float(places.min()), float(places.max())
         check_reach(low, high)
@@ -380,7 +381,8 @@ def multisine(
     if not (is_fitted or is_given):
         raise ParameterError(
             "expected either low and high (with amplitudes as ratios, if they differ) or offset "
-            "and amplitudes"
+            "and amplitudes",
+            argument="amplitudes",
         )
     sizes = np.ones(lines.size)
     if amplitudes is not None:

@@ -83,7 +83,7 @@ class XYReference:
                     f"{name} of y", f"{other} s", f"that of x, {one} s, as both are one path"
                 )
         if (self.radius is None) != (self.centre is None):
-            raise ParameterError("radius and centre: expected both of a circle, or neither")
+            raise ParameterError("radius or centre", "missing", "both of a circle, or neither")
 
     def __repr__(self) -> str:
         size = max(abs(edge) for axis in self.axes for edge in (axis.low, axis.high))

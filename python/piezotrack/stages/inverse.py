@@ -202,7 +202,9 @@ class Inverse:
         """
         _check(reference)
         if reference.period is None:
-            raise ParameterError(f"reference ({reference.name}) does not repeat: it has no table")
+            raise ParameterError(
+                "reference", f"({reference.name})", "one that repeats, for a table"
+            )
         turn = reference.period / check_dt(dt)
         if not (turn > 0.5 and abs(turn - np.round(turn)) <= 1e-6):
             raise ParameterError(
@@ -215,8 +217,10 @@ class Inverse:
         length = (self._settled(reference, reference.period) + 1) * reference.period
         if not _continues(reference) and length > reference.duration + 1e-3 * dt:
             raise ParameterError(
-                f"reference ({reference.name}) lasts {reference.duration:g} s: expected "
-                f"{length:g} s, until a period has settled"
+                f"reference ({reference.name})",
+                f"{reference.duration:g} s",
+                f"{length:g} s, until a period has settled",
+                verb="lasts",
             )
         return self.voltage(replace(reference, duration=length), dt, limits=limits)[-count:]
 
@@ -266,8 +270,10 @@ class Inverse:
         turns = reference.ramp / period
         if not turns <= MOST_TURNS:
             raise ParameterError(
-                f"reference ({reference.name}) repeats after {period:g} s: expected {MOST_TURNS} "
-                f"periods at most in its smooth start, {reference.ramp:g} s"
+                f"reference ({reference.name})",
+                f"after {period:g} s",
+                f"{MOST_TURNS} periods at most in its smooth start, {reference.ramp:g} s",
+                verb="repeats",
             )
         return max(self.settle, math.ceil(turns - 1e-9))
 

@@ -365,7 +365,7 @@ def _ringing(stage: Stage, mode: tuple[float, float]) -> Stage:
             "damping": 2.0 * damping_ratio * stiffness / natural,
         }
     else:
-        raise ParameterError(f"mode: a stage of {stage.info.title} has no linear dynamics")
+        raise ParameterError("mode", "given", f"none, as {stage.info.title} has no linear dynamics")
     return _with(stage, changes)
 
 

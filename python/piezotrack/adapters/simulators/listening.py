@@ -34,6 +34,6 @@ def cannot_listen(host: str, port: int, error: OSError) -> ParameterError:
     ParameterError("host is 'nowhere': it cannot be listened at: name or service not known")
     """
     taken = error.errno in (errno.EADDRINUSE, errno.EACCES)
-    name = f"port is {port}" if taken else f"host is {quoted(host)}"
+    name, value = ("port", port) if taken else ("host", quoted(host))
     reason = (error.strerror or str(error)).lower()
-    return ParameterError(f"{name}: it cannot be listened at: {reason}")
+    return ParameterError(name, value, f"an address that can be listened at: {reason}")

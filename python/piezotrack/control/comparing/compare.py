@@ -154,7 +154,8 @@ def compare_controllers(
             refused[name] = str(error)
     if not rows:
         name, words = next(iter(refused.items()))
-        raise ParameterError(f"controllers: not one could be made; {name}: {words}")
+        words = f"controllers: not one could be made; {name}: {words}"
+        raise ParameterError(words, argument="controllers")
     return ControllerComparison(
         rows=tuple(rows),
         references=tuple(one.name for one in task.references),
@@ -206,7 +207,9 @@ def _row(name: str, entries: list[Entry | None], task: Task, draws: int) -> Row:
     """Judge a controller by all references, on all variants of the stage."""
     first = next((entry for entry in entries if entry is not None), None)
     if first is None:
-        raise ParameterError("references: expected one at least that it can learn, which repeats")
+        raise ParameterError(
+            "references", "none that repeats", "one that can be learnt", verb="has"
+        )
     cells = [
         tuple(_cell(entry, variant, task, draws, chatters=i == 0) for entry in entries)
         for i, variant in enumerate(variants(task.stage))

@@ -175,7 +175,8 @@ def _observed(task: Task) -> list[Entry | None]:
             return task.each(controller)
     raise ParameterError(
         "margins: expected some that a PID around the observer keeps, of which its gains of 1 to "
-        f"{SHARES[-1]:g} times those of the PID alone do not"
+        f"{SHARES[-1]:g} times those of the PID alone do not",
+        argument="margins",
     )
 
 
@@ -263,7 +264,8 @@ def _h_infinity(task: Task) -> list[Entry | None]:
         if all(_keeps(controller, one.plant, task.margins) for one in plants):
             best = controller
     if best is None:
-        raise ParameterError(f"margins: expected some that a law by H-infinity keeps; {why}")
+        words = f"margins: expected some that a law by H-infinity keeps; {why}"
+        raise ParameterError(words, argument="margins")
     return task.each(best)
 
 

@@ -64,7 +64,7 @@ def inverse_of(entry: Any, drive: str) -> Inverse | None:
     network = found.get("kind") == "network"
     if not network and found.get("kind") != "inverse":
         kind = quoted(found.get("kind"))
-        raise ParameterError(f"feedforward: kind is {kind}: expected 'inverse' or 'network'")
+        raise ParameterError("feedforward: kind", kind, "'inverse' or 'network'")
     errors = [f"trained_{drive}", f"held_out_{drive}"]
     only("feedforward", found, [*keys, "numbers", *errors] if network else keys)
     stage = stage_of("feedforward: stage", found["stage"], drive)

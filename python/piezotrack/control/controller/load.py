@@ -106,7 +106,9 @@ def _provenance_of(document: dict[str, Any]) -> dict[str, Any]:
     expected = None if forward is None else digest(forward["stage"])
     if found["model_sha256"] not in (None, expected):
         raise ParameterError(
-            f"provenance: model_sha256 is {quoted(found['model_sha256'])}: expected {expected!r}, "
-            "that of the stage in the file, or null where the stage was changed on purpose"
+            "provenance: model_sha256",
+            quoted(found["model_sha256"]),
+            f"{expected!r}, that of the stage in the file, or null where the stage was changed "
+            "on purpose",
         )
     return found

@@ -70,7 +70,7 @@ class StateSpace(FeedbackLaw):
             raise ShapeError("b", "0 entries", "one for each state, 1 to 16")
         if a.size != n * n or c.size != n:
             raise ShapeError(
-                f"a, b and c have {a.size}, {n} and {c.size} entries: expected n x n, n and n"
+                "a, b and c", f"{a.size}, {n} and {c.size} entries", "n x n, n and n", verb="have"
             )
         back = None if self.back is None else _matrix("back", self.back).tolist()
         return a.tolist(), b.tolist(), c.tolist(), finite("d", _single("d", self.d), "V/m"), back

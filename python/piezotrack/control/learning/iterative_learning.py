@@ -251,7 +251,7 @@ class IterativeLearning:
     def best(self) -> int:
         """Place of the trial with the smallest rms error, 0 for the first."""
         if not self._trials:
-            raise ParameterError("best: expected a trial before it, by update")
+            raise ParameterError("best", "read without a trial", "a trial before it, by update")
         return int(np.argmin([one.rms_error for one in self._trials]))
 
     @property
@@ -352,7 +352,7 @@ class IterativeLearning:
         try:
             records = np.atleast_2d(real_array("measured", measured))
         except ValueError as error:
-            raise ShapeError(f"measured: expected records of one length ({error})") from None
+            raise ShapeError("measured", f"records: {error}", "them of one length") from None
         count = self._t.size
         if records.ndim != 2 or records.shape[1] != count or records.shape[0] < 1:
             raise ShapeError(
@@ -393,8 +393,9 @@ def one_trial(reference: Reference, method: Method, dt: float) -> Reference:
         return reference
     if reference.period is None:
         raise ParameterError(
-            f"reference ({reference.name}) does not repeat: expected one that does for method "
-            "'frequency', or method 'lifted'"
+            "reference",
+            f"({reference.name}), which does not repeat",
+            "one that does for method 'frequency', or method 'lifted'",
         )
     turn = reference.period / dt
     if abs(turn - round(turn)) > 1e-6 or round(turn) < 8:

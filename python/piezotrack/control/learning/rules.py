@@ -439,5 +439,7 @@ def _converging(best: R, asked: R | None) -> R:
     found = rule.convergence
     raise ParameterError(
         f"learning does not converge on {found.model}: at {found.frequency:.4g} Hz a trial leaves "
-        f"{found.factor:.4g} times the distance to the final table: expected below 1, with {remedy}"
+        f"{found.factor:.4g} times the distance to the final table: expected below 1, with "
+        f"{remedy}",
+        argument="cutoff",
     )

@@ -398,7 +398,7 @@ def contour(
         try:
             run.check(axis, of_x.delay, **free)
         except ParameterError as error:
-            raise ParameterError(f"{name}: {error}") from None
+            raise error.of(name) from None
     ahead = x, y
     if decoupling is not None:
         offsets = stage.x.sensor.offset, stage.y.sensor.offset

@@ -60,8 +60,9 @@ def check_period(controller: Controller, reference: Reference) -> None:
         return
     if reference.period is None:
         raise ParameterError(
-            f"reference ({reference.name}) does not repeat: expected one that does, for the "
-            "repetitive part"
+            "reference",
+            f"({reference.name}), which does not repeat",
+            "one that does, for the repetitive part",
         )
     check_turns(controller, reference.period, f"reference ({reference.name})")
 
@@ -106,7 +107,8 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
     elif controller.repetitive is not None:
         found += "; without the repetitive part it is stable, so lower kq or take another filter"
     hint = f" ({one.hint})" if one.hint else ""
-    raise ParameterError(f"{found}{hint}: expected a stable one, or unstable=True")
+    words = f"{found}{hint}: expected a stable one, or unstable=True"
+    raise ParameterError(words, argument="controller")
 
 
 def check_within_reach(

@@ -56,7 +56,10 @@ def check_playable(device: Device, controller: Controller) -> None:
         raise ParameterError("controller", type(controller).__name__, "pt.Controller")
     if controller.drive_unit != "V":
         raise ParameterError(
-            f"controller commands in {controller.drive_unit}: expected V, which a device puts out"
+            "controller",
+            f"in {controller.drive_unit}",
+            "V, which a device puts out",
+            verb="commands",
         )
     given = {"feedback": controller.feedback, "repetitive": controller.repetitive}
     if present := [name for name, part in given.items() if part is not None]:

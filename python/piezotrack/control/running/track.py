@@ -98,7 +98,7 @@ def track(
     if isinstance(stage, Device):
         if timing is not None or substeps != 10:
             raise ParameterError(
-                "timing or substeps is given: expected neither on a device, which has its own"
+                "timing or substeps", "given", "neither on a device, which has its own"
             )
         return track_on(
             stage, controller, reference, safe=safe, beyond_reach=beyond_reach, unstable=unstable

@@ -76,7 +76,7 @@ def to_control(
     if isinstance(part, (Controller, FeedbackLaw)):
         if limits is not None or delay != 0.0 or gain != "middle":
             raise ParameterError(
-                "limits, gain and delay have no effect on a feedback law: expected none"
+                "limits, gain or delay", "given", "none, as they have no effect on a feedback law"
             )
         return _feedback_law(part, dt)
     if not isinstance(part, (VirtualStage, Stage, IdentifiedModel)):
@@ -117,8 +117,10 @@ def _stage(
     if dt is None:
         if late > 0.0:
             raise ParameterError(
-                f"dt is missing: the stage has a delay of {late:g} s, which no continuous system "
-                "of a finite number of states has; expected a sampling interval"
+                "dt",
+                "missing",
+                f"a sampling interval, as the stage has a delay of {late:g} s, which no continuous "
+                "system of a finite number of states has",
             )
         system = (a, np.reshape(b, (-1, 1)), np.reshape(c, (1, -1)), [[d]])
         return _control().ss(*system, name=name, inputs=["voltage_V"], outputs=["displacement_m"])

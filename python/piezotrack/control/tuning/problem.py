@@ -234,8 +234,10 @@ def _check_has_integral_part(law: str, references: list[Reference]) -> None:
 def _check_feedforward(law: str, axis: Axis) -> None:
     if law == "pd" and axis.feedforward is None:
         raise ParameterError(
-            f"{axis.prefix}law is 'pd' without feedforward: expected feedforward=, for nothing "
-            "else brings the stage to where it is to be, or a law with an integral part"
+            f"{axis.prefix}law",
+            "'pd' without feedforward",
+            "feedforward=, for nothing else brings the stage to where it is to be, or a law with "
+            "an integral part",
         )
 
 

@@ -318,7 +318,8 @@ def _check_between(controller: Controller, plants: list[_core.LoopPlant], margin
                 raise ParameterError(
                     "amplitudes and rates: gains half-way between two places of the grid have a "
                     f"sensitivity of {check['sensitivity']:.3g}: expected at most "
-                    f"{margins.sensitivity:.3g}; take a finer grid or a smaller margin"
+                    f"{margins.sensitivity:.3g}; take a finer grid or a smaller margin",
+                    argument="amplitudes",
                 )
 
 

@@ -111,7 +111,7 @@ class Source:
         except DataError as error:
             raise self.error(str(error), line) from None
         except (ParameterError, ShapeError) as error:
-            raise type(error)(f"{self.name}: {error}") from None
+            raise error.of(self.name) from None
 
     @contextmanager
     def decoding(self, kind: str, logger: str | None = None) -> Iterator[None]:

@@ -376,7 +376,8 @@ def _source(model: object) -> tuple[str | None, ModelInfo | IdentifiedModel]:
             model_named(str(model))
         except ParameterError as error:
             words = str(error).removeprefix("model is ")
-            raise ParameterError(f"models has {words}; or the JSON file of a model") from None
+            words = f"models has {words}; or the JSON file of a model"
+            raise ParameterError(words, argument="models") from None
     raise ParameterError(
         "models",
         f"'{type(model).__name__}'",

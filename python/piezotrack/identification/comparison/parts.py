@@ -55,8 +55,10 @@ def parts_of(log: Dataset, train: object, test: object) -> tuple[Dataset, Datase
     elif test is None:
         if first[1] is None:
             raise ParameterError(
-                "train goes to the end of the record, which leaves nothing to validate on: "
-                "expected an end, or test="
+                "train",
+                "to the end of the record, which leaves nothing to validate on",
+                "an end, or test=",
+                verb="goes",
             )
         second = (first[1], None)
     one, two = _windowed("train", log, first), _windowed("test", log, second)
@@ -71,8 +73,11 @@ def _check_apart(one: Dataset, two: Dataset) -> None:
     if not shared[0].any() or not np.array_equal(one.y[shared[0]], two.y[shared[1]]):
         return
     raise ParameterError(
-        f"test goes from {two.t[0]:.6g} to {two.t[-1]:.6g} s and train from {one.t[0]:.6g} to "
-        f"{one.t[-1]:.6g} s: expected windows that do not overlap"
+        "test",
+        f"from {two.t[0]:.6g} to {two.t[-1]:.6g} s and train from {one.t[0]:.6g} to "
+        f"{one.t[-1]:.6g} s",
+        "windows that do not overlap",
+        verb="goes",
     )
 
 
@@ -92,4 +97,4 @@ def _windowed(name: str, log: Dataset, window: Window) -> Dataset:
     try:
         return log if window == (None, None) else log[window[0] : window[1]]
     except ParameterError as error:
-        raise ParameterError(f"{name}: {error}") from None
+        raise error.of(name, argument=name) from None

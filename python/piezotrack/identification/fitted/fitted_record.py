@@ -165,7 +165,7 @@ def _record(name: str, entry: Any, state: type[StageState]) -> FittedRecord:
         value = found[key]
         if value.get("unit") != unit:
             raise ParameterError(
-                f"the unit of {name}: {key} is {value.get('unit')!r}: expected {unit!r}"
+                f"the unit of {name}: {key}", f"{value.get('unit')!r}", f"{unit!r}"
             )
         return _core.as_number(f"{name}: {key}", value["value"])
 

@@ -321,8 +321,10 @@ class IdentifiedModel(Result):
         expect("data", data, Dataset, "a Dataset")
         if data.drive_unit != (unit := self.drive_unit) and "m" in (unit, data.drive_unit):
             raise ParameterError(
-                f"the drive of the record is in {data.drive_unit}: expected {unit}, as that of the "
-                "record identified"
+                "data",
+                f"a drive in {data.drive_unit}",
+                f"{unit}, as that of the record identified",
+                verb="has",
             )
         state = self._begins(data, history, initial)
         start = data.warmup

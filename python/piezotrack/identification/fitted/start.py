@@ -189,7 +189,7 @@ def start_of(entry: Any, state: type[StageState]) -> Start | None:
     begun = state_of("start: state", found["state"], state)
     history = checked_history(found["history"])
     if history is None:
-        raise ParameterError("start: history is None: expected 'virgin', 'settled' or 'fit'")
+        raise ParameterError("start: history", "None", "'virgin', 'settled' or 'fit'")
     volts = found["voltage"]["value"]
     return Start(
         history=history,

@@ -144,9 +144,7 @@ def bounds_of(name: str, pair: object) -> tuple[float, float]:
     of = f" of {name}" if name else ""
     two = list(pair) if has_entries(pair) else []
     if len(two) != 2:
-        raise ParameterError(
-            f"bounds{of} are {quoted(pair)}: expected (low, high)", argument="bounds"
-        )
+        raise ParameterError(f"bounds{of}", quoted(pair), "(low, high)", verb="are")
     low, high = two
     return _core.as_number(f"lower bound{of}", low), _core.as_number(f"upper bound{of}", high)
 

@@ -186,8 +186,7 @@ def _inequalities(constraints: object) -> tuple[str, ...]:
     for text in texts:
         if not isinstance(text, str):
             raise ParameterError(
-                f"constraint is {quoted(text)}: expected a text, as 'a2 < b1'",
-                argument="constraints",
+                "constraint", quoted(text), "a text, as 'a2 < b1'", argument="constraints"
             )
     return tuple(map(plain_text, texts))
 

@@ -152,7 +152,8 @@ def records_of(
     for i, one in enumerate(datasets):
         if one.drive_unit != datasets[0].drive_unit:
             raise ParameterError(
-                f"the drive of {label_of(one, i)} is in {one.drive_unit}: expected "
+                f"the drive of {label_of(one, i)}",
+                f"in {one.drive_unit}",
                 f"{datasets[0].drive_unit}, as that of {label_of(datasets[0], 0)}",
                 argument="data",
             )
@@ -191,11 +192,7 @@ def of_record(label: str) -> Iterator[None]:
     try:
         yield
     except PiezotrackError as error:
-        if not label:
-            raise
-        labelled = type(error)(f"{label}: {error}")
-        vars(labelled).update(vars(error))
-        raise labelled from None
+        raise error.of(label) from None
 
 
 def labels_of(records: Sequence[Record]) -> tuple[str, ...]:

@@ -192,7 +192,7 @@ def plot_convergence(
         The model was not searched.
     """
     if not fit.history.size:
-        raise ParameterError("the model was fitted by least squares: expected one of a search")
+        raise ParameterError("fit", "a model fitted by least squares", "one of a search")
     (ax,) = axes_or_new(ax, 1)
     # A cost of 0 has no place on a logarithmic scale.
     shown = np.isfinite(fit.history) & (fit.history > 0.0)
