@@ -395,7 +395,7 @@ def one_trial(reference: Reference, method: Method, dt: float) -> Reference:
         raise ParameterError(
             "reference",
             f"({reference.name}), which does not repeat",
-            "one that does for method 'frequency', or method 'lifted'",
+            "one that does with method='frequency', or method='lifted'",
         )
     turn = reference.period / dt
     if abs(turn - round(turn)) > 1e-6 or round(turn) < 8:

@@ -311,8 +311,8 @@ def lifted_rule(
         raise ParameterError(
             "reference",
             f"{samples} samples",
-            f"{LONGEST_LIFTED} at most for method 'lifted'; take a longer dt, or method "
-            "'frequency' for one that repeats",
+            f"{LONGEST_LIFTED} at most with method='lifted'; take a longer dt, or "
+            "method='frequency' for one that repeats",
             verb="has",
         )
     dt, pulse = nominal.controller.dt, nominal.impulse(samples)
