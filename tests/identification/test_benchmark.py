@@ -416,7 +416,7 @@ def test_names_that_are_none_are_refused() -> None:
         ({"noise": 0.0}, "noise is 0"),
         (
             {"rest": pt.Dataset(u=ramp_log().u, y=ramp_log().y, dt=DT, drive_unit="N")},
-            "the drive of rest is in N: expected V",
+            "rest has a drive in N: expected V",
         ),
     ],
 )

@@ -202,9 +202,7 @@ class Inverse:
         """
         _check(reference)
         if reference.period is None:
-            raise ParameterError(
-                "reference", f"({reference.name})", "one that repeats, for a table"
-            )
+            raise ParameterError(f"reference ({reference.name})", "one motion", "one that repeats")
         turn = reference.period / check_dt(dt)
         if not (turn > 0.5 and abs(turn - np.round(turn)) <= 1e-6):
             raise ParameterError(

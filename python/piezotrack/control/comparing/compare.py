@@ -207,9 +207,8 @@ def _row(name: str, entries: list[Entry | None], task: Task, draws: int) -> Row:
     """Judge a controller by all references, on all variants of the stage."""
     first = next((entry for entry in entries if entry is not None), None)
     if first is None:
-        raise ParameterError(
-            "references", "none that repeats", "one that can be learnt", verb="has"
-        )
+        words = "references: expected one at least that it can learn, which repeats"
+        raise ParameterError(words, argument="references")
     cells = [
         tuple(_cell(entry, variant, task, draws, chatters=i == 0) for entry in entries)
         for i, variant in enumerate(variants(task.stage))

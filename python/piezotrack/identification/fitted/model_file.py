@@ -275,7 +275,7 @@ def entries_of(name: str) -> Iterator[None]:
 def require_unit(name: str, entry: Mapping[str, Any], unit: str) -> None:
     """Refuse an entry that is in another unit than the one that is written."""
     if entry.get("unit") != unit:
-        raise ParameterError(f"unit of {name}", f"{entry.get('unit')!r}", f"{unit!r}")
+        raise ParameterError(f"the unit of {name}", f"{entry.get('unit')!r}", f"{unit!r}")
 
 
 def file_number(name: str, entry: Mapping[str, Any]) -> float:
