@@ -30,8 +30,8 @@ def cannot_listen(host: str, port: int, error: OSError) -> ParameterError:
 
     Examples
     --------
-    >>> cannot_listen("nowhere", 5025, OSError("Name or service not known"))
-    ParameterError("host is 'nowhere': it cannot be listened at: name or service not known")
+    >>> print(cannot_listen("::2", 5025, OSError("No such host")))
+    host is '::2': expected an address that can be listened at: no such host
     """
     taken = error.errno in (errno.EADDRINUSE, errno.EACCES)
     name, value = ("port", port) if taken else ("host", quoted(host))
