@@ -418,7 +418,7 @@ def test_refuses(name: str) -> None:
 def test_a_refusal_names_argument_value_unit_and_expectation() -> None:
     with pytest.raises(pt.ParameterError) as caught:
         pt.Pid(kp=math.nan, ti=1.0)
-    assert str(caught.value) == "kp is nan: expected a finite number, in V/m"
+    assert str(caught.value) == "kp is NaN V/m: expected a finite number"
     with pytest.raises(
         pt.ParameterError, match=r"kq is 1 V/m: .*write pt\.Repetitive\.from_um\(kq=1"
     ):
