@@ -216,7 +216,7 @@ def test_what_a_session_cannot_be_retuned_to() -> None:
             loop(feedback=PID, repetitive=pt.Repetitive(period=2.0), feedforward=INVERSE),
             "feedforward is another",
         ),
-        (5, "controller is int"),
+        (5, "controller is 5"),
     ):
         with pytest.raises(pt.ParameterError, match=message):
             session.retune(other)  # type: ignore[arg-type]

@@ -171,7 +171,7 @@ def test_margins_at_design_are_kept() -> None:
     assert again.provenance == other.provenance
     with pytest.raises(ParameterError, match="report is of another controller"):
         loop().save("other.json", report=report)
-    with pytest.raises(ParameterError, match="report is int: expected what"):
+    with pytest.raises(ParameterError, match=r"report is .*: expected what"):
         one.save("other.json", report=3)  # type: ignore[arg-type]
     assert not Path("other.json").exists()
 

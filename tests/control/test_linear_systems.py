@@ -70,7 +70,7 @@ def test_matrices_of_python_control_are_a_feedback_law() -> None:
 @pytest.mark.parametrize(
     ("part", "options", "message"),
     [
-        (3, {}, "part is int: expected a stage or a controller"),
+        (3, {}, "part is 3: expected a stage or a controller"),
         (MODE, {}, r"limits are missing: expected \(low, high\) in V"),
         (MODE, {"limits": (1.0, 0.0)}, "expected the lower one first"),
         (MODE, {"limits": (0.0, 1.0), "gain": "mean"}, "gain is 'mean': expected 'low'"),

@@ -97,13 +97,9 @@ class BenchmarkRecord:
 
     def __post_init__(self) -> None:
         checked_name("name", self.name)
-        if not isinstance(self.others, Mapping):
-            raise ParameterError(
-                "others", type(self.others).__name__, "records by what they are, as {'slow': log}"
-            )
+        expect("others", self.others, Mapping, "records by what they are, as {'slow': log}")
         for part, data in self.parts():
-            if not isinstance(data, Dataset):
-                raise ParameterError(part, type(data).__name__, "a Dataset")
+            expect(part, data, Dataset, "a Dataset")
             if data.drive_unit != self.fitted.drive_unit:
                 raise ParameterError(
                     part,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import given_or
+from .._support.arguments import expect, given_or
 from ..errors import ParameterError
 from ..identification.fitted.identified_model import IdentifiedModel
 from ..stages.base import Stage
@@ -49,12 +49,12 @@ def plant_of(stage: Plant | IdentifiedModel) -> VirtualStage:
     """
     if isinstance(stage, VirtualStage):
         return stage
-    if not isinstance(stage, (Stage, IdentifiedModel)):
-        raise ParameterError(
-            "stage",
-            type(stage).__name__,
-            "a pt.VirtualStage, a stage of a model, as a pt.DahlStage, or an identified one",
-        )
+    expect(
+        "stage",
+        stage,
+        (Stage, IdentifiedModel),
+        "a stage or an identified model",
+    )
     return VirtualStage.of(stage)
 
 

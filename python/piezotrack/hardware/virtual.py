@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import finite, not_negative
+from .._support.arguments import expect, finite, not_negative
 from .._support.arrays import signal_of
 from ..errors import DeviceError, ParameterError
 from ..identification.fitted.model_file import load
@@ -73,12 +73,12 @@ class VirtualDevice:
         memory: int = MEMORY,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        if not isinstance(stage, VirtualStage):
-            raise ParameterError(
-                "stage",
-                type(stage).__name__,
-                "pt.VirtualStage, as VirtualStage.of makes one of any model",
-            )
+        expect(
+            "stage",
+            stage,
+            VirtualStage,
+            "pt.VirtualStage, as VirtualStage.of makes it",
+        )
         self._limits = ordered("limits", stage.amplifier.limits if limits is None else limits)
         self._rates, self._memory = rates, _core.as_count("memory", memory)
         self._clock = clock

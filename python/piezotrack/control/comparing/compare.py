@@ -8,7 +8,7 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.arguments import given_or, number_pair, one_of
+from ..._support.arguments import expect, given_or, number_pair, one_of
 from ..._support.arrays import check_dt
 from ...errors import ParameterError, PiezotrackError
 from ...identification.fitted.identified_model import IdentifiedModel
@@ -127,8 +127,7 @@ def compare_controllers(
     """
     plant = plant_of(stage)
     low, high = number_pair("limits", limits, "V")
-    if not isinstance(model, (Stage, IdentifiedModel)):
-        raise ParameterError("model", type(model).__name__, "a stage or identified model")
+    expect("model", model, (Stage, IdentifiedModel), "a stage or identified model")
     interval = check_dt(dt)
     timing = timing_on(plant, timing, (low, high))
     check_delay(plant, timing.delay, interval)

@@ -314,10 +314,7 @@ class Controller:
         """Margins at design: of a report, or else of the file that this was read from."""
         if report is None:
             return None if self.provenance is None else self.provenance.get("design")
-        if not isinstance(report, DesignReport):
-            raise ParameterError(
-                "report", type(report).__name__, "what pt.check_loop or pt.tune returns"
-            )
+        expect("report", report, DesignReport, "what pt.check_loop or pt.tune returns")
         if getattr(report, "controller", self) != self:
             raise ParameterError("report", "of another controller", "that of this one")
         return report.design()

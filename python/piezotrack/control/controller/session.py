@@ -318,8 +318,7 @@ class Session:
         ParameterError
             It differs in more than its gains.
         """
-        if not isinstance(controller, type(self._controller)):
-            raise ParameterError("controller", type(controller).__name__, "pt.Controller")
+        expect("controller", controller, type(self._controller), "pt.Controller")
         if not math.isclose(controller.dt, self._controller.dt, rel_tol=1e-12):
             raise ParameterError(
                 "dt", f"{controller.dt:g} s", f"that of the session, {self._controller.dt:g} s"

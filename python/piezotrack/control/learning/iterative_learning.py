@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..._support.arguments import check_length, in_range, not_negative, one_of, positive
+from ..._support.arguments import check_length, expect, in_range, not_negative, one_of, positive
 from ..._support.arrays import real_array
 from ..._support.messages import quoted
 from ...data.dataset import Dataset
@@ -377,14 +377,12 @@ def _check_kinds(
         ("controller", controller, Controller),
         ("reference", reference, Reference),
     ):
-        if not isinstance(value, kind):
-            raise ParameterError(name, type(value).__name__, f"pt.{kind.__name__}")
+        expect(name, value, kind, f"pt.{kind.__name__}")
     if controller.repetitive is not None:
         raise ParameterError(
             "controller", "a repetitive part, which learns too", "one without", verb="has"
         )
-    if not isinstance(models, Sequence):
-        raise ParameterError("models", type(models).__name__, "a list of models")
+    expect("models", models, Sequence, "a list of models")
 
 
 def one_trial(reference: Reference, method: Method, dt: float) -> Reference:

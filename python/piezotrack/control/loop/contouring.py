@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import number_pair
+from ..._support.arguments import expect, number_pair
 from ..._support.files import write_result
 from ..._support.frames import frame_of
 from ..._support.result import Result
@@ -381,10 +381,8 @@ def contour(
     >>> run.metrics.peak_to_peak < 1.5e-6
     True
     """
-    if not isinstance(stage, XYStage):
-        raise ParameterError("stage", type(stage).__name__, "pt.XYStage")
-    if not isinstance(path, XYReference):
-        raise ParameterError("path", type(path).__name__, "pt.XYReference")
+    expect("stage", stage, XYStage, "pt.XYStage")
+    expect("path", path, XYReference, "pt.XYReference")
     both = _two(controllers)
     substeps = _core.as_count("substeps", substeps)
     free = {
@@ -469,8 +467,7 @@ def workspace(
     >>> print(f"{1e6 * middle[0]:.0f} um")
     60 um
     """
-    if not isinstance(stage, XYStage):
-        raise ParameterError("stage", type(stage).__name__, "pt.XYStage")
+    expect("stage", stage, XYStage, "pt.XYStage")
     alone = np.ndim(limits[0]) == 0
     pairs = [number_pair("limits", one, "V") for one in ([limits] * 2 if alone else limits)]
     axes = list(zip((stage.x, stage.y), pairs, strict=True))

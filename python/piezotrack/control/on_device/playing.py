@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import finite, not_negative
+from ..._support.arguments import expect, finite, not_negative
 from ...errors import ParameterError
 from ...hardware.measuring import (
     RAMP,
@@ -52,8 +52,7 @@ def check_limits(device: Device, controller: Controller) -> None:
 def check_playable(device: Device, controller: Controller) -> None:
     """Raise ParameterError unless a controller is a feedforward that a device can play."""
     check_device(device)
-    if not isinstance(controller, Controller):
-        raise ParameterError("controller", type(controller).__name__, "pt.Controller")
+    expect("controller", controller, Controller, "pt.Controller")
     if controller.drive_unit != "V":
         raise ParameterError(
             "controller",
@@ -179,8 +178,7 @@ def play(
     28 nm
     """
     check_device(device)
-    if not isinstance(reference, Reference):
-        raise ParameterError("reference", type(reference).__name__, "pt.Reference")
+    expect("reference", reference, Reference, "pt.Reference")
     if isinstance(controller, Inverse):
         if rate is None:
             raise ParameterError("rate", "not given", "the sampling rate of an inverse, Hz")

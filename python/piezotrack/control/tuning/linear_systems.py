@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..._support.arguments import not_negative, number_pair, one_of
+from ..._support.arguments import expect, not_negative, number_pair, one_of
 from ..._support.arrays import check_dt
 from ...errors import ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
@@ -79,8 +79,7 @@ def to_control(
                 "limits, gain or delay", "given", "none, as they have no effect on a feedback law"
             )
         return _feedback_law(part, dt)
-    if not isinstance(part, (VirtualStage, Stage, IdentifiedModel)):
-        raise ParameterError("part", type(part).__name__, "a stage or a controller")
+    expect("part", part, (VirtualStage, Stage, IdentifiedModel), "a stage or a controller")
     return _stage(part, limits, gain, dt, not_negative("delay", delay, "s"))
 
 

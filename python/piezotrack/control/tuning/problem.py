@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ... import _core
-from ..._support.arguments import given_or, number_pair, one_of
+from ..._support.arguments import expect, given_or, number_pair, one_of
 from ..._support.arrays import check_dt
 from ..._support.messages import quoted
 from ...errors import ParameterError
@@ -211,8 +211,7 @@ def _references(reference: Any, kind: type) -> list[Any]:
     given = [] if reference is None else reference
     references = list(given) if isinstance(given, Sequence) else [given]
     for one in references:
-        if not isinstance(one, kind):
-            raise ParameterError("reference", type(one).__name__, f"pt.{kind.__name__}")
+        expect("reference", one, kind, f"pt.{kind.__name__}")
     if kind is XYReference and not references:
         raise ParameterError(
             "reference",

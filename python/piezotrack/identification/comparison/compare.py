@@ -278,8 +278,7 @@ def compare(
     >>> found.best.name, found.train.duration, found.test.duration
     ('prandtl-ishlinskii', 10.0, 10.0)
     """
-    if not isinstance(data, Dataset):
-        raise ParameterError("data", type(data).__name__, "a Dataset, see pt.read")
+    expect("data", data, Dataset, "a Dataset, see pt.read")
     wanted = _wanted(models, data.drive_unit)
     first, second, carried = parts_of(data, train, test)
     method = (Descents(seed=seed, runs=runs), LeastSquares())

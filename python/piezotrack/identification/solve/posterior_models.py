@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..._support.arguments import positive
+from ..._support.arguments import expect, positive
 from ...data.dataset import Dataset
 from ...errors import ParameterError, PiezotrackError
 from ..fitted.identified_model import IdentifiedModel
@@ -89,10 +89,8 @@ def posterior_models(
     >>> all(one.score(log).rms < 1.1 * fit.score(log).rms for one in nearby)
     True
     """
-    if not isinstance(model, IdentifiedModel):
-        raise ParameterError("model", type(model).__name__, "a pt.IdentifiedModel")
-    if not isinstance(data, Dataset):
-        raise ParameterError("data", type(data).__name__, "a Dataset")
+    expect("model", model, IdentifiedModel, "a pt.IdentifiedModel")
+    expect("data", data, Dataset, "a Dataset")
     positive("deviations", deviations, "")
     values = _fitted(model)
     if not values:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Self
 
 from .... import _core
+from ...._support.arguments import expect
 from ....errors import ParameterError
 from ....hardware.limits import ordered
 from ....stages.virtual import VirtualStage
@@ -75,12 +76,12 @@ class GcsServer:
         port: int = 0,
         speed: float = 1.0,
     ) -> None:
-        if not isinstance(stage, VirtualStage):
-            raise ParameterError(
-                "stage",
-                type(stage).__name__,
-                "pt.VirtualStage, as VirtualStage.of makes one of any model",
-            )
+        expect(
+            "stage",
+            stage,
+            VirtualStage,
+            "pt.VirtualStage, as VirtualStage.of makes it",
+        )
         within = ordered("limits", stage.amplifier.limits if limits is None else limits)
         port = checked_port(port)
         speed = _core.as_number("speed", speed)
