@@ -342,7 +342,7 @@ def test_every_public_function_of_an_array_is_in_the_table() -> None:
 
 
 def test_buffers_are_touched_in_one_file() -> None:
-    for path in (Path(__file__).parents[1] / "rust/py/src").glob("*.rs"):
+    for path in (Path(__file__).parents[1] / "rust/py/src").rglob("*.rs"):
         text = path.read_text(encoding="utf-8")
         touches = re.search(r"readonly|as_array|as_slice|PyArrayMethods|PyBuffer", text)
         assert touches is None or path.name == "arrays.rs", path

@@ -85,6 +85,9 @@ const CONTROL: [&str; 27] = [
     "controller",
 ];
 
+/// From the bottom up.
+const PY: [&str; 7] = ["errors", "enter", "conversions", "control", "stages", "identify", "tune"];
+
 /// A source file: its path below `src`, and its module path, empty for lib.rs.
 struct Source {
     file: String,
@@ -343,12 +346,13 @@ fn files_of(name: &str) -> Vec<Source> {
 }
 
 /// Files of a crate, a room of it or its root, and the order of what is there.
-fn ordered() -> [(Vec<Source>, &'static [&'static str], &'static [&'static str]); 4] {
+fn ordered() -> [(Vec<Source>, &'static [&'static str], &'static [&'static str]); 5] {
     [
         (files_of("core"), &[], &CORE),
         (files_of("core"), &["identify"], &IDENTIFY),
         (files_of("core"), &["models"], &MODELS),
         (files_of("control"), &[], &CONTROL),
+        (files_of("py"), &[], &PY),
     ]
 }
 

@@ -1,30 +1,12 @@
 //! The Python module `piezotrack._core`: this file only registers the contents of the others.
 
-mod arrays;
-mod checkpoint;
-mod coefficients;
 mod control;
-mod descents;
-mod design;
-mod displacements;
+mod conversions;
 mod enter;
 mod errors;
 mod identify;
-mod inverse;
-mod least_squares;
-mod models;
-mod numbers;
-mod objective;
-mod parts;
-mod problem;
-mod snapshots;
-mod stage;
-mod step;
-mod swarm;
-mod tracking;
+mod stages;
 mod tune;
-mod virtual_stage;
-mod xy;
 
 use pyo3::prelude::*;
 
@@ -32,21 +14,21 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    numbers::register(module)?;
-    models::register(module)?;
-    stage::register(module)?;
-    inverse::register(module)?;
-    identify::register(module)?;
-    descents::register(module)?;
-    objective::register(module)?;
-    step::register(module)?;
-    swarm::register(module)?;
-    parts::register(module)?;
-    control::register(module)?;
-    design::register(module)?;
-    least_squares::register(module)?;
-    virtual_stage::register(module)?;
-    tracking::register(module)?;
+    conversions::numbers::register(module)?;
+    stages::models::register(module)?;
+    stages::stage::register(module)?;
+    stages::inverse::register(module)?;
+    identify::identification::register(module)?;
+    identify::descents::register(module)?;
+    identify::objective::register(module)?;
+    identify::step::register(module)?;
+    identify::swarm::register(module)?;
+    control::parts::register(module)?;
+    control::controller::register(module)?;
+    control::design::register(module)?;
+    identify::least_squares::register(module)?;
+    stages::virtual_stage::register(module)?;
+    control::tracking::register(module)?;
     tune::register(module)?;
-    xy::register(module)
+    stages::xy::register(module)
 }

@@ -10,13 +10,13 @@ use piezotrack_core::tune::{
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
-use crate::control::PyController;
-use crate::design::PyLoopPlant;
+use crate::control::controller::PyController;
+use crate::control::design::PyLoopPlant;
+use crate::control::tracking::LoopTiming;
+use crate::conversions::arrays::samples;
 use crate::enter::enter_quiet_pool;
 use crate::errors::raise;
-use crate::tracking::LoopTiming;
-use crate::virtual_stage::PyVirtualStage;
+use crate::stages::virtual_stage::PyVirtualStage;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyTask>()?;

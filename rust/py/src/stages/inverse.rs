@@ -9,10 +9,10 @@ use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::arrays::{array, samples};
-use crate::displacements::in_metres;
+use crate::conversions::arrays::{array, samples};
+use crate::conversions::displacements::in_metres;
+use crate::conversions::snapshots::{load, saved};
 use crate::errors::raise;
-use crate::snapshots::{load, saved};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyInverse>()

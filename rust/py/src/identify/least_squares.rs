@@ -10,12 +10,12 @@ use piezotrack_core::signal::{Drive, Stop};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
+use crate::conversions::arrays::samples;
 use crate::enter::{enter, enter_quiet_pool};
 use crate::errors::raise;
-use crate::models::{Named, named};
-use crate::problem::{OneRecord, PyProblem};
-use crate::stage::hold;
+use crate::identify::problem::{OneRecord, PyProblem};
+use crate::stages::models::{Named, named};
+use crate::stages::stage::hold;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyLeastSquaresFit>()?;

@@ -12,13 +12,13 @@ use piezotrack_core::simulate::{
 };
 use pyo3::prelude::*;
 
-use crate::arrays::{array, samples};
-use crate::control::PyController;
+use crate::control::controller::PyController;
+use crate::control::tracking::{Arrays, LoopTiming, PyTrackingRun, stopped};
+use crate::conversions::arrays::{array, samples};
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::stage::hold;
-use crate::tracking::{Arrays, LoopTiming, PyTrackingRun, stopped};
-use crate::virtual_stage::{OpenLoopArrays, PyVirtualStage, open_loop_arrays};
+use crate::stages::stage::hold;
+use crate::stages::virtual_stage::{OpenLoopArrays, PyVirtualStage, open_loop_arrays};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyXyStage>()?;

@@ -4,7 +4,7 @@ use piezotrack_core::Result;
 use piezotrack_core::design::{GainRange, LoopPlant, SampledLoop, Verdict};
 use pyo3::prelude::*;
 
-use crate::control::PyController;
+use crate::control::controller::PyController;
 use crate::enter::enter;
 use crate::errors::raise;
 

@@ -8,8 +8,8 @@ use piezotrack_core::math::room;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyTuple};
 
+use crate::conversions::numbers::is_unsuitable;
 use crate::errors::{data, raise, shape};
-use crate::numbers::is_unsuitable;
 
 /// Most samples of an array: 4 GB, of which a simulation needs several times as much.
 const MOST_SAMPLES: usize = 500_000_000;

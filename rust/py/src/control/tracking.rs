@@ -8,8 +8,8 @@ use piezotrack_core::simulate::{ReferenceSamples, Timing, TrackingRun, VirtualSt
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::arrays::{array, samples};
-use crate::control::PyController;
+use crate::control::controller::PyController;
+use crate::conversions::arrays::{array, samples};
 use crate::errors::{raise, shape};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -9,10 +9,10 @@ use piezotrack_core::simulate::DELAY_LINE;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::coefficients::of_controller;
-use crate::displacements::{meant, outside};
+use crate::control::coefficients::of_controller;
+use crate::conversions::displacements::{meant, outside};
+use crate::conversions::snapshots::{load, saved};
 use crate::errors::raise;
-use crate::snapshots::{load, saved};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyController>()?;

@@ -8,14 +8,14 @@ use piezotrack_core::simulate::{
 };
 use pyo3::prelude::*;
 
-use crate::arrays::{array, samples};
-use crate::control::PyController;
-use crate::design::PyLoopPlant;
+use crate::control::controller::PyController;
+use crate::control::design::PyLoopPlant;
+use crate::control::tracking::{Arrays, LoopTiming, PyTrackingRun, stopped};
+use crate::conversions::arrays::{array, samples};
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::models::{Named, named};
-use crate::stage::{PyStage, hold};
-use crate::tracking::{Arrays, LoopTiming, PyTrackingRun, stopped};
+use crate::stages::models::{Named, named};
+use crate::stages::stage::{PyStage, hold};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyVirtualStage>()?;

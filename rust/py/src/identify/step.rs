@@ -5,9 +5,9 @@ use piezotrack_core::identify::{self, Conventional, StepReadings, StepResponse};
 use piezotrack_core::signal;
 use pyo3::prelude::*;
 
-use crate::arrays::{array, samples};
+use crate::conversions::arrays::{array, samples};
 use crate::errors::raise;
-use crate::stage::hold;
+use crate::stages::stage::hold;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyConventional>()?;

@@ -11,14 +11,14 @@ use piezotrack_core::integrator::Order;
 use piezotrack_core::signal::Drive;
 use pyo3::prelude::*;
 
-use crate::arrays::{array, samples};
-use crate::checkpoint::PyCheckpoint;
-use crate::descents::PyDescents;
+use crate::conversions::arrays::{array, samples};
 use crate::enter::{Watchers, enter_pool};
 use crate::errors::raise;
-use crate::problem::PyProblem;
-use crate::stage::hold;
-use crate::swarm::PySettings;
+use crate::identify::checkpoint::PyCheckpoint;
+use crate::identify::descents::PyDescents;
+use crate::identify::problem::PyProblem;
+use crate::identify::swarm::PySettings;
+use crate::stages::stage::hold;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PySearch>()?;

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 
 use crate::enter::enter_quiet_pool;
 use crate::errors::raise;
-use crate::problem::{PyProblem, Question};
+use crate::identify::problem::{PyProblem, Question};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyObjective>()

@@ -8,9 +8,9 @@ use piezotrack_core::models::Model;
 use piezotrack_core::signal::Hold;
 use pyo3::prelude::*;
 
-use crate::arrays::samples;
+use crate::conversions::arrays::samples;
 use crate::errors::raise;
-use crate::stage::hold;
+use crate::stages::stage::hold;
 
 /// A `Problem`.
 #[derive(FromPyObject)]

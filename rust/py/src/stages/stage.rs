@@ -7,13 +7,13 @@ use piezotrack_core::signal::{self, Drive, Hold};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
-use crate::arrays::{array, samples};
-use crate::design::PyLoopPlant;
+use crate::control::design::PyLoopPlant;
+use crate::control::tracking::stopped;
+use crate::conversions::arrays::{array, samples};
 use crate::enter::enter;
 use crate::errors::raise;
-use crate::inverse::PyInverse;
-use crate::models::{Named, named};
-use crate::tracking::stopped;
+use crate::stages::inverse::PyInverse;
+use crate::stages::models::{Named, named};
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyStage>()?;

@@ -1,0 +1,7 @@
+//! Controllers, their parts and their loops.
+
+pub mod coefficients;
+pub mod controller;
+pub mod design;
+pub mod parts;
+pub mod tracking;

@@ -1,0 +1,10 @@
+//! Identification of models, and the experiments and searches beside it.
+
+pub mod checkpoint;
+pub mod descents;
+pub mod identification;
+pub mod least_squares;
+pub mod objective;
+pub mod problem;
+pub mod step;
+pub mod swarm;
