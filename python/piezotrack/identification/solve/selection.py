@@ -108,7 +108,7 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     if not trials.found:
         raise trials.refused or DataError("no model could be fitted")
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
-    fit = identify_model(problem.of_model(best.info), methods.method(best.info), run, best.start)
+    fit = identify_model(problem.of_model(best.info), methods.method(best.info), run)
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
 
 

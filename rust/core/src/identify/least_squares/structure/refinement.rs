@@ -21,8 +21,9 @@ use crate::identify::parameters::drift::{DriftKind, repeats};
 use crate::identify::records::history::History;
 use crate::signal::range;
 
-/// Rounds through all parts, at most.
-const ROUNDS: usize = 4;
+/// Rounds through all parts, at most; and of starts, the best of which goes on.
+pub(super) const ROUNDS: usize = 4;
+pub(super) const FIRST_ROUNDS: usize = 1;
 
 /// Least gain of a move: less is chance, and the structure of the moves before stays.
 const LEAST_GAIN: f64 = 3e-3;
@@ -72,9 +73,9 @@ impl Refinement<'_> {
         cost
     }
 
-    /// Moves to better structures until there is none.
-    pub fn refine(&self, fit: &mut Fit<'_>) -> Option<()> {
-        for _ in 0..ROUNDS {
+    /// Moves to better structures until there is none, or so many rounds are over.
+    pub fn refine(&self, fit: &mut Fit<'_>, rounds: usize) -> Option<()> {
+        for _ in 0..rounds {
             let before = self.cost(fit);
             self.histories(fit)?;
             self.slow_and_late(fit)?;

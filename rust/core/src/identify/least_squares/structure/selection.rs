@@ -5,7 +5,7 @@
 use super::lag::{best_lag, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::nodes::{add_once, choose_nodes, few_or_many, spread};
-use super::refinement::Refinement;
+use super::refinement::{FIRST_ROUNDS, ROUNDS, Refinement};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
 use crate::identify::least_squares::common::{Common, Thinned};
@@ -104,19 +104,39 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         starts.extend([History::Virgin, History::Settled, History::Fitted].map(Some));
     }
     let begun = with_each(&starts, |history| with_slow_and_late(&fit, settings, mode, *history))?;
-    let found = with_each(&begun, |start| {
+    let found = with_each(&distinct(begun), |start| {
         let mut trial = start.clone();
-        refinement.refine(&mut trial)?;
+        refinement.refine(&mut trial, FIRST_ROUNDS)?;
         Some(trial)
     })?;
     let better =
         |a: Fit<'a>, b: Fit<'a>| if refinement.cost(&b) < refinement.cost(&a) { b } else { a };
     let mut fit = found.into_iter().reduce(better)?;
     choose_nodes(&mut fit, settings)?;
-    refinement.refine(&mut fit)?;
+    refinement.refine(&mut fit, ROUNDS)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
     Some(fit)
+}
+
+/// Fits of different structures, the first of each.
+fn distinct(fits: Vec<Fit<'_>>) -> Vec<Fit<'_>> {
+    let mut kept: Vec<Fit<'_>> = Vec::new();
+    for fit in fits {
+        let same = |other: &Fit<'_>| {
+            let history =
+                |of: &Fit<'_>| of.begins.iter().map(|one| one.history).collect::<Vec<_>>();
+            let alike =
+                (&other.times, other.form, &other.drifts) == (&fit.times, fit.form, &fit.drifts);
+            alike
+                && history(other) == history(&fit)
+                && (other.rms / fit.rms - 1.0).abs() < SAME - 1.0
+        };
+        if !kept.iter().any(same) {
+            kept.push(fit);
+        }
+    }
+    kept
 }
 
 /// The structure from that of another model.
@@ -143,7 +163,7 @@ fn resumed<'a>(mut fit: Fit<'a>, settings: &Settings, start: &Structure) -> Opti
         }
     }
     let refinement = Refinement { settings, shown: matches!(form, Form::Modes(_)) };
-    refinement.refine(&mut fit)?;
+    refinement.refine(&mut fit, ROUNDS)?;
     choose_nodes(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
