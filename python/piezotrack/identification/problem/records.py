@@ -150,14 +150,14 @@ def records_of(
                     argument=name,
                 )
     records = tuple(
-        one if isinstance(one, Record) else Record(one, **values)  # type: ignore[arg-type]
-        for one in given
+        entry if isinstance(entry, Record) else Record(entry, **values)  # type: ignore[arg-type]
+        for entry in given
     )
     datasets = [one.data for one in records]
-    for i, one in enumerate(datasets):
-        if one.drive_unit != datasets[0].drive_unit:
+    for i, dataset in enumerate(datasets):
+        if dataset.drive_unit != datasets[0].drive_unit:
             raise ParameterError(
-                f"the drive of {label_of(one, i)} is in {one.drive_unit}: expected "
+                f"the drive of {label_of(dataset, i)} is in {dataset.drive_unit}: expected "
                 f"{datasets[0].drive_unit}, as that of {label_of(datasets[0], 0)}",
                 argument="data",
             )
@@ -176,11 +176,11 @@ def _listed(data: object) -> list[Dataset | Record]:
         raise ParameterError(
             "data is an empty list: expected at least one Dataset", argument="data"
         )
-    for i, one in enumerate(data):
-        if not isinstance(one, (Dataset, Record)):
+    for i, entry in enumerate(data):
+        if not isinstance(entry, (Dataset, Record)):
             raise ParameterError(
                 f"data is a {type(data).__name__} whose record {i + 1} is "
-                f"{type(one).__name__}: expected a Dataset, as pt.read or "
+                f"{type(entry).__name__}: expected a Dataset, as pt.read or "
                 "pt.Dataset.from_frame make it, or a pt.Record",
                 argument="data",
             )
