@@ -6,7 +6,9 @@ both languages.
 
 from __future__ import annotations
 
-from typing import Any
+import re
+from copy import copy
+from typing import Any, Self
 
 __all__ = [
     "DataError",
@@ -22,6 +24,8 @@ __all__ = [
 
 # Characters of a message, at most; what it quotes may be a file in one line.
 LONGEST = 480
+# The name in the subject of a sentence: "log.csv: thresholds[2]", "bounds of mass".
+_ARGUMENT = re.compile(r"(?s)(?:.*: )?([^ \[]*).*")
 
 
 class PiezotrackError(Exception):
@@ -34,6 +38,26 @@ class PiezotrackError(Exception):
     def __init__(self, message: str = "") -> None:
         super().__init__(_printable(message))
 
+    def of(self, label: str, **attributes: Any) -> Self:
+        """Return the same error with a label before its sentence, as the name of a file.
+
+        Parameters
+        ----------
+        label : str
+            Name of a file, or of one of several; the error stays as it is where it is empty.
+        **attributes : object
+            Attributes that it has in place of those of the error, as ``argument``.
+
+        Returns
+        -------
+        PiezotrackError
+            Of the same class.
+        """
+        labelled = copy(self)
+        vars(labelled).update(attributes)
+        labelled.args = (_printable(f"{label}: {self}" if label else str(self)),)
+        return labelled
+
 
 def _printable(message: str) -> str:
     shown = (c if c.isprintable() else repr(c)[1:-1] for c in _shortened(message))
@@ -45,8 +69,46 @@ def _shortened(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:half]} ... {text[-half:]}"
 
 
-class ParameterError(PiezotrackError, ValueError):
+class _ArgumentError(PiezotrackError, ValueError):
+    verb = "is"
+
+    def __init__(
+        self,
+        subject: str = "",
+        value: object = None,
+        expected: str = "",
+        *,
+        verb: str = "",
+        argument: str | None = None,
+    ) -> None:
+        if expected:
+            argument = argument or _ARGUMENT.sub(r"\1", subject)
+            subject = f"{subject} {verb or self.verb} {value}: expected {expected}"
+        super().__init__(subject)
+        self.argument = argument
+
+
+class ParameterError(_ArgumentError):
     """An argument has a value that cannot be used: names it, its value, what was expected.
+
+    Its sentence is composed as that of the core's errors, "dt is 0 s: expected a time above 0", of
+    the argument, its value as text and what was expected; or it is given whole.
+
+    Attributes
+    ----------
+    argument : str or None
+        Name of the argument, where the error is about one.
+
+    Examples
+    --------
+    >>> error = ParameterError("dt", "0 s", "a time above 0")
+    >>> error.argument, str(error)
+    ('dt', 'dt is 0 s: expected a time above 0')
+    """
+
+
+class ShapeError(_ArgumentError):
+    """An array has the wrong number of dimensions or entries.
 
     Attributes
     ----------
@@ -54,13 +116,7 @@ class ParameterError(PiezotrackError, ValueError):
         Name of the argument, where the error is about one.
     """
 
-    def __init__(self, message: str = "", *, argument: str | None = None) -> None:
-        super().__init__(message)
-        self.argument = argument
-
-
-class ShapeError(PiezotrackError, ValueError):
-    """An array has the wrong number of dimensions or entries."""
+    verb = "has"
 
 
 class DataError(PiezotrackError, ValueError):

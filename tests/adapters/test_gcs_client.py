@@ -211,5 +211,8 @@ def test_a_server_that_cannot_be_is_refused(arguments: dict[str, object], words:
 
 
 def test_a_port_that_is_taken_is_refused(server: GcsServer) -> None:
-    with pytest.raises(pt.ParameterError, match=f"port is {server.port}: it cannot be listened at"):
+    with pytest.raises(
+        pt.ParameterError,
+        match=f"port is {server.port}: expected",
+    ):
         GcsServer(quiet_stage(), port=server.port)

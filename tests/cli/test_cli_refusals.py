@@ -243,7 +243,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "export loop.json --out file": ("file cannot be made a folder",),
     "export loop.json --json --quiet": ("--json and --quiet", "at most"),
     "export loop.json --name 1x": ("name is '1x'", "a letter, then letters"),
-    "export loop.json --reference sine:1Hz,0..9um": ("loop.json: reference is given", "no feedf"),
+    "export loop.json --reference sine:1Hz,0..9um": ("loop.json: --reference is given", "no feedf"),
     "export loop.json --reference gone.csv": ("gone.csv: there is no such file",),
     "export loop.json --to json --float": ("--float", "expected it left out"),
     "export loop.json --period 2": ("--period has no effect without --reference",),

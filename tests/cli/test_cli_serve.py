@@ -84,4 +84,4 @@ def test_what_cannot_be_served_is_refused() -> None:
     assert refusal("serve", "gcs", "--host", "256.0.0.1").startswith("--host is '256.0.0.1'")
     with GcsServer(quiet_stage()) as server:
         said = refusal("serve", "gcs", "--port", str(server.port))
-    assert said.startswith(f"--port is {server.port}: it cannot be listened at")
+    assert said.startswith(f"--port is {server.port}: expected an address that can be listened at")

@@ -98,9 +98,9 @@ def test_a_model_of_several_logs_is_used_like_any_other() -> None:
     [
         (("--window", "0:1", "--window", "0:2", "--window", "0:3"), "--window is given 3 times"),
         (("--delay", "0", "--delay", "0", "--delay", "0"), "--delay is given 3 times with 2 logs"),
-        (("--weight", "0"), "record 1 (a.csv): weight is 0: expected a finite number above 0"),
-        (("--weight", "1", "--weight", "-1"), "record 2 (b.csv): weight is -1"),
-        (("--history", "virgin", "--history", "old"), "record 2 (b.csv): history is 'old'"),
+        (("--weight", "0"), "record 1 (a.csv): --weight is 0: expected a finite number above 0"),
+        (("--weight", "1", "--weight", "-1"), "record 2 (b.csv): --weight is -1"),
+        (("--history", "virgin", "--history", "old"), "record 2 (b.csv): --history is 'old'"),
         (("--window", "0:1", "--window", "9:"), "b.csv: --window 9:"),
         (("--creep", "1,0"), "creep[1] is 0 s: expected a finite number above 0"),
     ],

@@ -216,7 +216,7 @@ def test_what_a_session_cannot_be_retuned_to() -> None:
             loop(feedback=PID, repetitive=pt.Repetitive(period=2.0), feedforward=INVERSE),
             "feedforward is another",
         ),
-        (5, "controller is int"),
+        (5, "controller is 5"),
     ):
         with pytest.raises(pt.ParameterError, match=message):
             session.retune(other)  # type: ignore[arg-type]
@@ -418,7 +418,7 @@ def test_refuses(name: str) -> None:
 def test_a_refusal_names_argument_value_unit_and_expectation() -> None:
     with pytest.raises(pt.ParameterError) as caught:
         pt.Pid(kp=math.nan, ti=1.0)
-    assert str(caught.value) == "kp is nan: expected a finite number, in V/m"
+    assert str(caught.value) == "kp is NaN V/m: expected a finite number"
     with pytest.raises(
         pt.ParameterError, match=r"kq is 1 V/m: .*write pt\.Repetitive\.from_um\(kq=1"
     ):

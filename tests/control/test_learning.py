@@ -237,7 +237,7 @@ def test_a_record_that_cannot_be_learnt_from_changes_nothing(
         ({"mode_scales": ()}, "mode_scales is empty"),
         ({"more_delays": (-1.0,)}, "more_delays"),
         ({"models": LINEAR}, "models is PrandtlIshlinskiiStage"),
-        ({"models": ["dahl"]}, "stage is str"),
+        ({"models": ["dahl"]}, "stage is '"),
     ],
 )
 def test_settings_are_checked(options: dict[str, Any], words: str) -> None:

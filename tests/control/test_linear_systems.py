@@ -70,11 +70,15 @@ def test_matrices_of_python_control_are_a_feedback_law() -> None:
 @pytest.mark.parametrize(
     ("part", "options", "message"),
     [
-        (3, {}, "part is int: expected a stage or a controller"),
+        (3, {}, "part is 3: expected a stage or a controller"),
         (MODE, {}, r"limits are missing: expected \(low, high\) in V"),
         (MODE, {"limits": (1.0, 0.0)}, "expected the lower one first"),
         (MODE, {"limits": (0.0, 1.0), "gain": "mean"}, "gain is 'mean': expected 'low'"),
-        (MODE, {"limits": (0.0, 1.0), "delay": 0.1}, "dt is missing: the stage has a delay of 0.1"),
+        (
+            MODE,
+            {"limits": (0.0, 1.0), "delay": 0.1},
+            "dt is missing: expected a sampling interval, as the stage has a delay of 0.1",
+        ),
         (MODE, {"limits": (0.0, 1.0), "dt": 0.0}, "dt is 0"),
         (PID, {}, "dt is missing: expected the sampling interval"),
         (PID, {"dt": 0.1, "limits": (0.0, 1.0)}, "have no effect on a feedback law"),

@@ -245,8 +245,8 @@ def test_an_unstable_loop_is_refused() -> None:
 
 @pytest.mark.parametrize("stage", [5, None, "dahl", pt.stages.DahlState()])
 def test_what_cannot_be_led_is_refused(stage: Any) -> None:
-    words = r"expected a pt\.VirtualStage, a stage of a model"
-    with pytest.raises(pt.ParameterError, match=f"stage is {type(stage).__name__}: {words}"):
+    words = r"^stage is .*: expected a stage or an identified model"
+    with pytest.raises(pt.ParameterError, match=words):
         pt.track(stage, loop(), sine(0.5, 2.0))
     with pytest.raises(pt.ParameterError, match=words):
         pt.check_loop(stage, loop(feedback=pt.Pid.xu_li_2010()))

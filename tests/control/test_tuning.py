@@ -159,7 +159,7 @@ def test_shares_of_what_was_asked_for() -> None:
         ({"parts": "repetitive", "reference": None}, "expected references that repeat"),
         ({"margins": 2.0}, "margins is float"),
         ({"spread": 0.1}, "spread is float"),
-        ({"reference": "sine"}, "reference is str"),
+        ({"reference": "sine"}, "reference is '"),
         ({"feedforward": "dahl"}, "feedforward is 'dahl'"),
         ({"goal": "rms"}, "goal is str: expected pt.Goal"),
         ({"goal": pt.Goal(effort=-1.0)}, "effort is -1"),
@@ -178,7 +178,7 @@ def test_shares_of_what_was_asked_for() -> None:
         ({"search": 40}, "search is int: expected pt.TuningSearch"),
         ({"search": pt.TuningSearch(particles=1)}, "particles is 1"),
         ({"stage": []}, "stage is empty"),
-        ({"stage": "mine"}, "stage is str"),
+        ({"stage": "mine"}, "stage is '"),
     ],
 )
 def test_wrong_arguments_are_named(changes: dict[str, Any], words: str) -> None:

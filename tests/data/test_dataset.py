@@ -209,10 +209,10 @@ def test_bounds_are_real_numbers() -> None:
 
 
 BAD_WINDOWS: list[tuple[Any, str]] = [
-    (5, "5 is not a slice: a dataset is sliced in seconds"),
-    (2.5, "2.5 is not a slice"),
-    ((slice(0, 1), slice(0, 1)), "is not a slice"),
-    (slice(0.0, 10.0, 2), "the slice has a step of 2"),
+    (5, "window is 5: expected a slice in seconds"),
+    (2.5, "window is 2.5"),
+    ((slice(0, 1), slice(0, 1)), "expected a slice"),
+    (slice(0.0, 10.0, 2), "window has a step of 2"),
     (slice("a", None), "start is 'a': expected a finite number of seconds or None"),
     (slice(None, float("nan")), "stop is nan"),
     (slice(float("-inf"), None), "start is -inf"),

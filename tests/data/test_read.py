@@ -319,7 +319,7 @@ BAD_ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"time": True}, "time: True is not a column"),
     ({"displacement": 1.0}, "displacement: 1.0 is not a column"),
     ({"displacement": ""}, "displacement: '' is not a column"),
-    ({"drive": 2, "displacement": 2}, "two of them are the same column"),
+    ({"drive": 2, "displacement": 2}, "name the same column twice"),
     ({"units": {"current": "A"}}, "units: 'current' is not a column"),
     ({"units": {7: "V"}}, "units: 7 is not a column"),
     ({"units": {"drive": "W"}}, "column 'voltage_V': unknown unit 'W': expected one of V, mV"),

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from piezotrack.cli.identify import identify_command
 from typer import testing
 
 import piezotrack as pt
-from piezotrack.cli.advice import as_options, options_named
+from piezotrack.cli.advice import as_options, command_at_work
 from piezotrack.cli.commands import app
 from piezotrack.data.log_file import write_log
 from records import BOX, HELD, quick
@@ -58,8 +59,8 @@ def without_progress(errors: str) -> str:
 
 def as_printed(text: str) -> str:
     """A table as `identify` prints it: --runs 4 where Python says runs=4."""
-    with options_named(["runs", "stiffness", "window", "fix"]):
-        return as_options(text)
+    command_at_work.set(identify_command)
+    return as_options(text)
 
 
 def ran(*arguments: str) -> str:

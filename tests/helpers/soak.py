@@ -214,6 +214,8 @@ def _verdict_of(call: Callable[[], Any]) -> tuple[list[str], Any]:
         except (pt.PiezotrackError, MemoryError) as error:
             # MemoryError: a size within the documented limits and beyond those of the machine.
             faults += bad_message(str(error))
+            if getattr(error, "argument", "") is None:
+                faults.append(f"no argument {origin(error)}: {str(error)[:80]}")
         except KeyboardInterrupt:
             if not Alarm.rung:
                 raise

@@ -411,12 +411,12 @@ def test_names_that_are_none_are_refused() -> None:
     ("arguments", "words"),
     [
         ({"name": "a/b"}, "name is 'a/b': expected up to 80 small letters"),
-        ({"others": [ramp_log()]}, "others is list"),
-        ({"rest": 3}, "rest is int: expected a Dataset"),
+        ({"others": [ramp_log()]}, "others is"),
+        ({"rest": 3}, "rest is 3: expected a Dataset"),
         ({"noise": 0.0}, "noise is 0"),
         (
             {"rest": pt.Dataset(u=ramp_log().u, y=ramp_log().y, dt=DT, drive_unit="N")},
-            "the drive of rest is in N: expected V",
+            "rest has a drive in N: expected V",
         ),
     ],
 )

@@ -121,7 +121,7 @@ def test_a_model_file_keeps_the_unit() -> None:
     model = pt.load("piezo.json")
     assert (model.drive_unit, model.model) == ("m", fit.model)
     assert model.score(height()).rms < 1e-9
-    with pytest.raises(pt.ParameterError, match="the drive of the record is in V: expected m"):
+    with pytest.raises(pt.ParameterError, match="data has a drive in V: expected m"):
         model.score(height("V", 1e6))
 
 

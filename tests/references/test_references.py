@@ -393,7 +393,11 @@ BAD: list[tuple[Any, dict[str, Any], str]] = [
     (pt.staircase, {"dwell": 0.0, "steps": 2, "low": 0.0, "high": UM}, "rise is 0"),
     (pt.staircase, {"dwell": 1.0, "levels": [0.0]}, "levels has 1 entries"),
     (pt.staircase, {"dwell": 1.0, "levels": [0.0, math.nan]}, "levels has nan"),
-    (pt.staircase, {"dwell": 1.0, "levels": [0.0, UM], "low": 0.0}, "low and high come with steps"),
+    (
+        pt.staircase,
+        {"dwell": 1.0, "levels": [0.0, UM], "low": 0.0},
+        "low or high is given: expected levels",
+    ),
     (pt.staircase, {"dwell": 1.0, "levels": [0.0, 30.0]}, "high is 30"),
     (pt.multisine, {**RANGE, "frequencies": []}, "frequencies has 0 entries"),
     (pt.multisine, {**RANGE, "frequencies": [1.0, -2.0]}, "frequencies has -2"),

@@ -68,9 +68,14 @@ def test_a_fault_of_the_package_is_told_from_one_beside_it() -> None:
     assert verdict_of(beside["fail"])[0] == ["TypeError in controller.py:fail: x"]
 
 
+def test_an_error_of_an_argument_has_its_name() -> None:
+    faults, _ = verdict_of(raising(pt.ParameterError("dt is 0: expected more")))
+    assert [fault.partition(" outside")[0] for fault in faults] == ["no argument"]
+
+
 def test_what_may_come_is_no_fault() -> None:
     assert verdict_of(lambda: 1) == ([], 1)
-    assert verdict_of(raising(pt.ParameterError("dt is 0: expected more"))) == ([], REFUSED)
+    assert verdict_of(raising(pt.ParameterError("dt", "0", "more"))) == ([], REFUSED)
     assert verdict_of(raising(MemoryError())) == ([], REFUSED)
 
 

@@ -57,7 +57,7 @@ def expect(name: str, value: object, kinds: type | tuple[type, ...], expected: s
     piezotrack.errors.ParameterError: data is 1.0: expected a text
     """
     if not isinstance(value, kinds):
-        raise ParameterError(f"{name} is {quoted(value)}: expected {expected}")
+        raise ParameterError(name, quoted(value), expected)
 
 
 def one_of(name: str, value: object, words: Collection[str]) -> None:
@@ -72,7 +72,7 @@ def one_of(name: str, value: object, words: Collection[str]) -> None:
     if not isinstance(value, str) or value not in words:
         *first, last = map(repr, words)
         expected = f"{', '.join(first)} or {last}" if first else last
-        raise ParameterError(f"{name} is {quoted(value)}: expected {expected}")
+        raise ParameterError(name, quoted(value), expected)
 
 
 def finite(name: str, value: object, unit: str) -> float:
@@ -104,9 +104,7 @@ def finite(name: str, value: object, unit: str) -> float:
     """
     number = _core.as_number(name, value)
     if not math.isfinite(number):
-        raise ParameterError(
-            f"{name} is {number}: expected a finite number, in {unit}", argument=name
-        )
+        raise ParameterError(name, number, f"a finite number, in {unit}")
     return number
 
 
@@ -120,9 +118,7 @@ def positive(name: str, value: object, unit: str) -> float:
     """
     number = _core.as_number(name, value)
     if not 0.0 < number < math.inf:
-        raise ParameterError(
-            f"{name} is {number:g}: expected a finite number above 0, in {unit}", argument=name
-        )
+        raise ParameterError(name, f"{number:g}", f"a finite number above 0, in {unit}")
     return number
 
 
@@ -136,9 +132,7 @@ def hertz(name: str, value: object) -> float:
     """
     number = positive(name, value, "Hz")
     if not SLOWEST <= number <= FASTEST:
-        raise ParameterError(
-            f"{name} is {number:g} Hz: expected {SLOWEST:g} to {FASTEST:g} Hz", argument=name
-        )
+        raise ParameterError(name, f"{number:g} Hz", f"{SLOWEST:g} to {FASTEST:g} Hz")
     return number
 
 
@@ -164,9 +158,7 @@ def in_range(name: str, value: object, highest: float, unit: str) -> float:
     number = _core.as_number(name, value)
     if not 0.0 <= number <= highest or number == math.inf:
         end = f"from 0 to {highest:g}" if highest < math.inf else "of 0 or above"
-        raise ParameterError(
-            f"{name} is {number:g}: expected a finite number {end}, in {unit}", argument=name
-        )
+        raise ParameterError(name, f"{number:g}", f"a finite number {end}, in {unit}")
     return number
 
 
@@ -192,7 +184,7 @@ def bounds(low: object, high: object) -> tuple[float, float]:
     bottom, top = finite("low", low, "m"), finite("high", high, "m")
     check_reach(bottom, top)
     if not bottom < top:
-        raise ParameterError(f"low is {bottom:g}: expected less than high, which is {top:g} m")
+        raise ParameterError("low", f"{bottom:g}", f"less than high, which is {top:g} m")
     return bottom, top
 
 
@@ -206,8 +198,9 @@ def check_length(name: str, value: float) -> None:
     """Raise ParameterError if a length [m] is so large that it must be in another unit."""
     if abs(value) >= TOO_FAR:
         raise ParameterError(
-            f"{name} is {value:g}: expected metres, and no piezo stage goes so far; "
-            f"{plain(value)} um is {plain(value)}e-6"
+            name,
+            f"{value:g}",
+            f"metres, and no piezo stage goes so far; {plain(value)} um is {plain(value)}e-6",
         )
 
 
@@ -226,14 +219,12 @@ def numbers(
     entries = _entries(name, values) if several else [values]  # type: ignore[arg-type]
     array = np.array([_core.as_number(name, value) for value in entries])
     if array.size < least:
-        raise ParameterError(
-            f"{name} has {array.size} entries: expected at least {least}", argument=name
-        )
+        raise ParameterError(name, f"{array.size} entries", f"at least {least}", verb="has")
     for number in array:
         if not (math.isfinite(number) and number > above):
             limit = "" if above == -math.inf else f" above {above:g}"
             raise ParameterError(
-                f"{name} has {number:g}: expected finite numbers{limit}, in {unit}", argument=name
+                name, f"{number:g}", f"finite numbers{limit}, in {unit}", verb="has"
             )
     return array
 
@@ -250,10 +241,10 @@ def number_pair(name: str, ends: object, unit: str) -> tuple[float, float]:
     several = isinstance(ends, Sequence) or hasattr(type(ends), "tolist")
     pair = list(islice(ends, 3)) if several and has_entries(ends) else []
     if len(pair) != 2:
-        raise ParameterError(f"{name} are {quoted(ends)}: expected (low, high) in {unit}")
+        raise ParameterError(name, quoted(ends), f"(low, high) in {unit}", verb="are")
     low, high = (finite(f"{name}[{i}]", value, unit) for i, value in enumerate(pair))
     if not low < high:
-        raise ParameterError(f"{name} are ({low:g}, {high:g}) {unit}: expected the lower one first")
+        raise ParameterError(name, f"({low:g}, {high:g}) {unit}", "the lower one first", verb="are")
     return low, high
 
 
@@ -279,9 +270,7 @@ def as_numbers(name: str, values: object) -> tuple[float, ...]:
     (1.0, 2.5)
     """
     if not has_entries(values):
-        raise ParameterError(
-            f"{name} is {quoted(values)}: expected numbers in a list", argument=name
-        )
+        raise ParameterError(name, quoted(values), "numbers in a list")
     entries = _entries(name, values)
     return tuple(_core.as_number(f"{name}[{i}]", value) for i, value in enumerate(entries))
 
@@ -290,9 +279,7 @@ def _entries(name: str, values: Iterable[object]) -> list[object]:
     """Return the entries of a list of settings, of which there are never many."""
     entries = list(islice(values, MOST_ENTRIES + 1))
     if len(entries) > MOST_ENTRIES:
-        raise ParameterError(
-            f"{name} has more entries: expected {MOST_ENTRIES} at most", argument=name
-        )
+        raise ParameterError(name, "more entries", f"{MOST_ENTRIES} at most", verb="has")
     return entries
 
 
@@ -318,5 +305,5 @@ def given_or(name: str, value: Settings | None, default: Settings) -> Settings:
     """
     kind = type(default)
     if value is not None and not isinstance(value, kind):
-        raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+        raise ParameterError(name, type(value).__name__, f"pt.{kind.__name__}")
     return default if value is None else value

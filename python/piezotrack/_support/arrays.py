@@ -49,9 +49,9 @@ def check_dt(dt: float, name: str = "dt") -> float:
     """Return `dt` [s] as a float, or raise ParameterError unless it is an interval."""
     number = real(dt)
     if not 0.0 < number < math.inf:
-        raise ParameterError(f"{name} is {quoted(dt)}: expected a finite number of seconds above 0")
+        raise ParameterError(name, quoted(dt), "a finite number of seconds above 0")
     if not SHORTEST <= number <= LONGEST:
-        raise ParameterError(f"{name} is {number:g} s: expected {SHORTEST:g} to {LONGEST:g} s")
+        raise ParameterError(name, f"{number:g} s", f"{SHORTEST:g} to {LONGEST:g} s")
     return number
 
 
@@ -117,7 +117,9 @@ def time_axis(t: ArrayLike | None, dt: float | None, u: Array) -> tuple[Array, f
     """Return the times of the samples of `u` and their interval [s], given either."""
     if (t is None) == (dt is None):
         given = "neither is" if t is None else "both are"
-        raise ParameterError(f"t and dt: expected exactly one of them, {given} given")
+        raise ParameterError(
+            f"t and dt: expected exactly one of them, {given} given", argument="dt"
+        )
     if t is None and dt is not None:
         interval = check_dt(dt)
         return signal_of("t", interval * np.arange(u.size)), interval
@@ -160,11 +162,11 @@ def real_array(name: str, values: object) -> Array:
     try:
         array = np.asarray(unmasked(values))
     except (TypeError, ValueError, OverflowError):
-        raise ShapeError(f"{name} is not an array: expected one number for each sample") from None
+        raise ShapeError(name, "not an array", "one number for each sample", verb="is") from None
     if array.dtype.kind not in "biuf":
         raise DataError(f"{name} holds values of type {array.dtype}: expected real numbers")
     if array.size > MOST_SAMPLES:
-        raise ShapeError(f"{name} has {array.size} samples: expected {MOST_SAMPLES} at most")
+        raise ShapeError(name, f"{array.size} samples", f"{MOST_SAMPLES} at most")
     with np.errstate(over="ignore"):
         return array.astype(np.float64, copy=False)
 
@@ -175,11 +177,9 @@ def signal_of(
     """Return a read-only float64 copy of one-dimensional `values`, as long as `like`."""
     array = real_array(name, values)
     if array.ndim != 1:
-        raise ShapeError(f"{name} has the shape {array.shape}: expected one dimension")
+        raise ShapeError(name, f"the shape {array.shape}", "one dimension")
     if like is not None and array.size != like.size:
-        raise ShapeError(
-            f"u has {like.size} samples and {name} has {array.size}: expected equally many"
-        )
+        raise ShapeError("u", f"{like.size} samples and {name} has {array.size}", "equally many")
     signal = np.array(array)
     if finite and (bad := _first(~(np.abs(signal) < LARGEST))) is not None:
         value = signal[bad]

@@ -184,12 +184,14 @@ def require(text: str, *quantities: str) -> Unit:
     unit = lookup(text)
     if unit is None:
         raise ParameterError(
-            f"unknown unit {quoted(text)}: expected one of {known_units(*quantities)}"
+            f"unknown unit {quoted(text)}: expected one of {known_units(*quantities)}",
+            argument="units",
         )
     if quantities and unit.quantity not in quantities:
         raise ParameterError(
-            f"{quoted(text)} is a unit of {unit.quantity}: expected a unit of "
-            f"{' or '.join(quantities)}, one of {known_units(*quantities)}"
+            quoted(text),
+            f"a unit of {unit.quantity}",
+            f"a unit of {' or '.join(quantities)}, one of {known_units(*quantities)}",
         )
     return unit
 

@@ -95,13 +95,13 @@ def serve_epics(
     """
     check_device(device)
     if not isinstance(prefix, str) or not prefix or not prefix.isascii() or " " in prefix:
-        raise ParameterError(
-            f"prefix is {quoted(prefix)}: expected the start of names, as LAB:STAGE"
-        )
+        raise ParameterError("prefix", quoted(prefix), "the start of names, as LAB:STAGE")
     if len(prefix) > LONGEST_PREFIX:
         raise ParameterError(
-            f"prefix is {quoted(prefix)}, {len(prefix)} letters: expected {LONGEST_PREFIX} at "
-            f"most, as a name in EPICS has at most {LONGEST_NAME} with :{max(RECORDS, key=len)}"
+            "prefix",
+            f"{quoted(prefix)}, {len(prefix)} letters",
+            f"{LONGEST_PREFIX} at most, as a name in EPICS has at most {LONGEST_NAME} with "
+            f":{max(RECORDS, key=len)}",
         )
     longest = min(_core.as_count("longest", longest), device.memory)
     builder = required_package("softioc.builder", "epics", "serving EPICS")

@@ -100,14 +100,15 @@ channels of one device, as Dev1/ao0 and Dev1/ai0, which share a clock
         device = output.partition("/")[0]
         if device != input.partition("/")[0] or "/" not in output or "/" not in input:
             raise ParameterError(
-                f"output is {quoted(output)} and input {quoted(input)}: expected channels of one "
-                "device, as Dev1/ao0 and Dev1/ai0, which share a clock"
+                "output",
+                f"{quoted(output)} and input {quoted(input)}",
+                "channels of one device, as Dev1/ao0 and Dev1/ai0, which share a clock",
             )
         self._device = device
         self._daq = required_package("nidaqmx", "ni", f"device {output}")
         self._scale = finite("metres_per_volt", metres_per_volt, "m/V")
         if self._scale == 0.0:
-            raise ParameterError("metres_per_volt is 0: expected the scale of the sensor, in m/V")
+            raise ParameterError("metres_per_volt", "0", "the scale of the sensor, in m/V")
         self._offset = finite("offset", offset, "m")
         self._limits = ordered("limits", limits)
         self._sensor = ordered("sensor", sensor)
@@ -316,7 +317,7 @@ def from_address(
     """Connect to ``ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V``."""
     output, comma, source = path.partition(",")
     if host or port or not comma or "," in source:
-        raise ParameterError(f"device is on {quoted(path)}: expected {FORM}")
+        raise ParameterError("device", f"on {quoted(path)}", FORM)
     given = Options(FORM, options)
     scale, limits = given.ratio("scale"), given.span("limits", "voltage")
     offset = given.value("offset", "displacement", 0.0)

@@ -101,7 +101,7 @@ class ScpiBuffer:
             _check_template("append", self.append, needed="table")
         if (self.chunk is None) != (self.append is None):
             raise ParameterError(
-                f"chunk is {self.chunk} and append is {quoted(self.append)}: expected both, or none"
+                "chunk", f"{self.chunk} and append is {quoted(self.append)}", "both, or none"
             )
         if self.chunk is not None:
             _core.as_count("chunk", self.chunk)
@@ -366,7 +366,7 @@ def _check_template(name: str, template: str, *allowed: str, needed: str | None 
         fields, problem = [], f" ({error})"
     if problem or set(fields) - set(known) or (needed and needed not in fields):
         takes = ", ".join(f"{{{one}}}" for one in known) or "no field"
-        raise ParameterError(f"{name} is {quoted(template)}{problem}: expected a text with {takes}")
+        raise ParameterError(name, f"{quoted(template)}{problem}", f"a text with {takes}")
 
 
 def from_address(
@@ -374,7 +374,7 @@ def from_address(
 ) -> ScpiDevice:
     """Connect to ``scpi://HOST:PORT?unit=um&limits=0..75V``."""
     if not host or port is None or path.strip("/"):
-        raise ParameterError(f"device has no host and port: expected {FORM}")
+        raise ParameterError("device", "no host and port", FORM, verb="has")
     given = Options(FORM, options)
     unit, limits = given.text("unit"), given.span("limits", "voltage")
     exchange, timeout = given.text("exchange", EXCHANGE), given.value("timeout", "time", TIMEOUT)

@@ -178,7 +178,7 @@ class Benchmark(Result):
         found = [one for one in self.results if one.record == record]
         if not found:
             known = ", ".join(map(repr, dict.fromkeys(one.record for one in self.results)))
-            raise ParameterError(f"record is {quoted(record)}: expected one of {known}")
+            raise ParameterError("record", quoted(record), f"one of {known}")
         return sorted(found, key=lambda one: one.judged.rms if one.judged else math.inf)
 
     @property
@@ -303,7 +303,7 @@ def benchmark(
     'prandtl-ishlinskii'
     """
     if overwrite and folder is None:
-        raise ParameterError("overwrite is True without a folder: expected a folder too")
+        raise ParameterError("overwrite", "True without a folder", "a folder too")
     contenders, judged = contenders_named(models), records_named(records)
     kept = None if folder is None else BoardFolder(Path(folder))
     pairs = [

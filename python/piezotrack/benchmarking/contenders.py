@@ -74,10 +74,10 @@ def contenders_named(names: Iterable[str] | None) -> list[Contender]:
     for name in wanted:
         if name not in listed:
             raise ParameterError(
-                f"models has {quoted(name)}: expected some of {', '.join(map(repr, listed))}"
+                "models", quoted(name), f"some of {', '.join(map(repr, listed))}", verb="has"
             )
     if not wanted:
-        raise ParameterError("models is empty: expected one or more")
+        raise ParameterError("models", "empty", "one or more")
     return [listed[name] for name in dict.fromkeys(wanted)]
 
 

@@ -95,8 +95,9 @@ def contender_of(name: str, title: str, function: object) -> Contender:
     if count not in (FITS, PREDICTS) or not callable(function):
         what = "no function" if count is None else f"a function of {count} arguments"
         raise ParameterError(
-            f"{name} is {quoted(function)}, {what}: expected fit(u, y, dt), which returns "
-            "predict(u, dt), or predict(u, dt) itself"
+            name,
+            f"{quoted(function)}, {what}",
+            "fit(u, y, dt), which returns predict(u, dt), or predict(u, dt) itself",
         )
     fit = partial(_fitted, name, function) if count == FITS else partial(_given, name, function)
     return Contender(name=name, title=title, fit=fit, suits=lambda _: True)

@@ -42,8 +42,7 @@ def checked_name(argument: str, name: object) -> str:
     """
     if not isinstance(name, str) or not NAME.fullmatch(name) or len(name) > 80:
         raise ParameterError(
-            f"{argument} is {quoted(name)}: expected up to 80 small letters, digits, dots and "
-            "hyphens"
+            argument, quoted(name), "up to 80 small letters, digits, dots and hyphens"
         )
     return name
 
@@ -98,18 +97,15 @@ class BenchmarkRecord:
 
     def __post_init__(self) -> None:
         checked_name("name", self.name)
-        if not isinstance(self.others, Mapping):
-            raise ParameterError(
-                f"others is {type(self.others).__name__}: expected records by what they are, as "
-                "{'slow': log}"
-            )
+        expect("others", self.others, Mapping, "records by what they are, as {'slow': log}")
         for part, data in self.parts():
-            if not isinstance(data, Dataset):
-                raise ParameterError(f"{part} is {type(data).__name__}: expected a Dataset")
+            expect(part, data, Dataset, "a Dataset")
             if data.drive_unit != self.fitted.drive_unit:
                 raise ParameterError(
-                    f"the drive of {part} is in {data.drive_unit}: expected "
-                    f"{self.fitted.drive_unit}, as that of the part fitted"
+                    part,
+                    f"a drive in {data.drive_unit}",
+                    f"{self.fitted.drive_unit}, as that of the part fitted",
+                    verb="has",
                 )
         if self.noise is not None:
             positive("noise", self.noise, "m")

@@ -3,53 +3,43 @@
 from __future__ import annotations
 
 import re
-from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING
+from inspect import signature
+from typing import TYPE_CHECKING, Any
+
+from typer.models import OptionInfo
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable
 
-__all__ = ["as_options", "options_named"]
+__all__ = ["as_options", "command_at_work"]
 
-# What Python says, what the command line says, and the option that this takes.
-ADVICE = [
+# Arguments whose option has another name.
+OPTIONS = {
+    "count": "plays",
+    "dead_zones": "asymmetry",
+    "largest_error": "allowed_um",
+    "margins.gain": "gain_margin",
+    "margins.sensitivity": "sensitivity",
+    "units": "unit",
+}
+# Remedies that are no argument, the same for the command line, and the option that this takes.
+REMEDIES = [
     (
-        r"time=0, drive=1, displacement=2, units=\{0: 's', 1: 'V', 2: 'um'\}",
+        r"time=0, drive=1, displacement=2, units=\{.*\}",
         "--time 0 --drive 1 --displacement 2 --unit 0=s --unit 1=V --unit 2=um",
         "--drive",
     ),
     (
-        r"time=0, drive=1, displacement=2, units=\{0: 's', 1: 'V', 2: 'um'\}",
+        r"time=0, drive=1, displacement=2, units=\{.*\}",
         "--time 0 --displacement 1 --unit 0=s --unit 1=um",
         "--displacement",
     ),
     (r"units=\{'?(\w+)'?: \.\.\.\}", r"--unit \1=...", "--unit"),
-    (r"\bunits= says\b", "--unit says", "--unit"),
     (r"\bin parameters=", "by --fix", "--fix"),
-    (r"\bbeyond_reach=True", "--beyond-reach", "--beyond-reach"),
-    (r"\breference=, ", "--reference, ", "--reference"),
-    (r"\bunstable=True", "--unstable", "--unstable"),
     (r"pt\.\w+\.from_um\(k[pq]=.*\)", "a value in V/um", "--kp"),
     (r"\bcreep=False", "--creep none", "--creep"),
-    (r"\bmodel='([\w-]+)'", r"--model \1", "--model"),
-    (r"\bcount is (?=\d+: expected 1 to)", "--plays is ", "--plays"),
-    (r"\bdead_zones is ", "--asymmetry is ", "--asymmetry"),
-    (r"\bmargins\.gain is ", "--gain-margin is ", "--gain-margin"),
-    (r"\blargest_error is ", "--allowed-um is ", "--allowed-um"),
-    (r"\bmethod '(frequency|lifted)'", r"--method \1", "--mode-scales"),
-    (r"\brates (?=begins|ends)", "--rates ", "--rates"),
-    (r"\bmode_scales is ", "--mode-scales is ", "--mode-scales"),
-    (r"\bmargins\.sensitivity is ", "--sensitivity is ", "--sensitivity"),
-    (r"^(speed|port|host|limits|prefix) (?=is|are)", r"--\1 ", "--speed"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
-    *(
-        (rf"(?<!--unit )\b{name}=(?!\.\.\.) ?", f"--{name} ", f"--{name}")
-        for name in (
-            *("time", "drive", "displacement", "dt", "resample", "period"),
-            *("stiffness", "runs", "train", "test"),
-        )
-    ),
 ]
 # Where a command has no options for columns, the header of the file has to say it.
 IN_THE_HEADER = [
@@ -62,52 +52,53 @@ IN_THE_HEADER = [
     (r", or give it as units=\{[^}]*\}", ""),
     (r"; an evenly sampled record whose times .*", ""),
 ]
+# An argument in a sentence or a table, as "runs=4", "model='dahl'" or "unstable=True".
+ARGUMENT = re.compile(r"(?<![\w'(?{&,])(?<!has )(?<!--unit )(\w+)=(?!\.)(?:True\b|'([\w-]+)'|) ?")
 
-_options: ContextVar[frozenset[str]] = ContextVar("_options", default=frozenset())
-
-
-@contextmanager
-def options_named(parameters: Iterable[str]) -> Iterator[None]:
-    """Declare which options the command at work has.
-
-    Parameters
-    ----------
-    parameters : iterable of str
-        Its parameters in Python.
-
-    Yields
-    ------
-    None
-    """
-    token = _options.set(frozenset(f"--{name.replace('_', '-')}" for name in parameters))
-    try:
-        yield
-    finally:
-        _options.reset(token)
+command_at_work: ContextVar[Callable[..., Any] | None] = ContextVar("_command", default=None)
 
 
-def as_options(text: str) -> str:
+def as_options(said: object) -> str:
     """Say in options what the library says in arguments.
 
     Parameters
     ----------
-    text : str
+    said : PiezotrackError or str
         An error, a remark or a table.
 
     Returns
     -------
     str
-        The same; what the command has no option for is left in Python's words.
+        The same; what the command at work has no option for is left in Python's words.
     """
-    options = _options.get()
-    if "--displacement" not in options and "--drive" not in options:
+    command = command_at_work.get()
+    arguments = {} if command is None else signature(command, eval_str=True).parameters
+    known = {
+        _option(name)
+        for name, one in arguments.items()
+        if any(isinstance(info, OptionInfo) for info in getattr(one.annotation, "__metadata__", ()))
+    }
+
+    def in_options(match: re.Match[str]) -> str:
+        option = _option(match[1])
+        return f"{option} {match[2] or ''}" if option in known else match[0]
+
+    text, argument = str(said), getattr(said, "argument", None) or ""
+    if (option := _option(argument)) in known:
+        text = re.sub(rf"(^|: ){re.escape(argument)}(?=[ [])", rf"\1{option}", text, count=1)
+    if not known & {"--displacement", "--drive"}:
         for python, words in IN_THE_HEADER:
             text = re.sub(python, words, text)
-    if "--resample" not in options:
+    if "--resample" not in known:
         text = re.sub(r"; resample= puts it [^;]*", "", text)
     text = text.replace(", or largest_saturation=0.5 or more", "")
-    for python, option, needed in ADVICE:
-        if needed in options:
-            text = re.sub(python, option, text)
+    for python, words, needed in REMEDIES:
+        if needed in known:
+            text = re.sub(python, words, text)
+    text = ARGUMENT.sub(in_options, text)
     # An option at the end of a sentence or before a comma.
     return re.sub(r"(--[a-z-]+) (?=[,;:)\n]|\.(?:\s|$)|$)", r"\1", text)
+
+
+def _option(argument: str) -> str:
+    return f"--{OPTIONS.get(argument, argument)}".replace("_", "-")

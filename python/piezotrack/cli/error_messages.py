@@ -8,14 +8,13 @@ import re
 import sys
 from contextlib import suppress
 from functools import wraps
-from inspect import signature
 from typing import TYPE_CHECKING, ParamSpec
 
 import typer
 
 from .._support.display.progress_bar import one_clock
 from ..errors import PiezotrackError
-from .advice import as_options, options_named
+from .advice import as_options, command_at_work
 from .interruption import at_rest, at_work, exit_code, stopped
 from .terminal import one_line
 
@@ -39,9 +38,10 @@ P = ParamSpec("P")
 
 def report_errors(command: Callable[P, None]) -> Callable[P, None]:
     """Turn the exceptions of piezotrack into one sentence and an exit code."""
-    parameters = list(signature(command).parameters)
 
-    def attempt(*args: P.args, **kwargs: P.kwargs) -> None:
+    @wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        command_at_work.set(command)
         try:
             with at_work(), one_clock():
                 command(*args, **kwargs)
@@ -53,7 +53,7 @@ def report_errors(command: Callable[P, None]) -> Callable[P, None]:
                 # A module that was being imported has turned the interruption into another error.
                 code = _stopped(KeyboardInterrupt())
             elif isinstance(error, PiezotrackError):
-                _say(as_options(str(error)))
+                _say(as_options(error))
                 code = BAD_INPUT
             elif isinstance(error, MemoryError):
                 _say(str(error) or "not enough memory")
@@ -65,11 +65,6 @@ def report_errors(command: Callable[P, None]) -> Callable[P, None]:
         else:
             return
         raise typer.Exit(code)
-
-    @wraps(command)
-    def run(*args: P.args, **kwargs: P.kwargs) -> None:
-        with options_named(parameters):
-            attempt(*args, **kwargs)
 
     return run
 

@@ -163,7 +163,7 @@ def refuse_without_effect(context: typer.Context, options: Iterable[str], reason
         source = context.get_parameter_source(name)
         if source is not None and source.name != "DEFAULT":
             option = f"--{name.replace('_', '-')}"
-            raise ParameterError(f"{option} has no effect {reason}: expected it left out")
+            raise ParameterError(option, f"no effect {reason}", "it left out", verb="has")
 
 
 @contextmanager
@@ -172,7 +172,7 @@ def of_file(file: Path) -> Iterator[None]:
     try:
         yield
     except PiezotrackError as error:
-        raise type(error)(f"{file.name}: {error}") from None
+        raise error.of(file.name) from None
 
 
 def can_be_folder(out: Path) -> None:
@@ -210,7 +210,7 @@ def seconds(option: str, text: str) -> tuple[float | None, float | None]:
     """Parse A:B in seconds; either end may be left out."""
     start, colon, stop = text.partition(":")
     if not colon:
-        raise ParameterError(f"{option} is '{text}': expected A:B in seconds, as 3:23")
+        raise ParameterError(option, f"'{text}'", "A:B in seconds, as 3:23")
     first, last = (number(option, end) if end else None for end in (start, stop))
     return first, last
 
@@ -223,7 +223,7 @@ def windowed(log: Dataset, file: Path, option: str, window: str | None) -> Datas
     try:
         return log[start:stop]
     except ParameterError as error:
-        raise ParameterError(f"{file.name}: {option} {window}: {error}") from None
+        raise error.of(f"{file.name}: {option} {window}") from None
 
 
 def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
@@ -232,9 +232,9 @@ def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
     for text in given or []:
         name, equals, value = text.partition("=")
         if not equals or not name or not value:
-            raise ParameterError(f"{option} is '{text}': expected NAME=VALUE")
+            raise ParameterError(option, f"'{text}'", "NAME=VALUE")
         if name.strip() in dict(pairs):
-            raise ParameterError(f"{option} names {name.strip()} twice: expected it once")
+            raise ParameterError(option, f"{name.strip()} twice", "it once", verb="names")
         pairs.append((name.strip(), value.strip()))
     return pairs
 
@@ -244,12 +244,12 @@ def number(option: str, text: str, expected: str = "a number") -> float:
     try:
         return float(text)
     except ValueError:
-        raise ParameterError(f"{option} has '{text}': expected {expected}") from None
+        raise ParameterError(option, f"'{text}'", expected, verb="has") from None
 
 
 def number_range(option: str, text: str) -> tuple[float, float]:
     """Parse LOW:HIGH."""
     low, colon, high = text.partition(":")
     if not colon:
-        raise ParameterError(f"{option} has '{text}': expected LOW:HIGH")
+        raise ParameterError(option, f"'{text}'", "LOW:HIGH", verb="has")
     return number(option, low), number(option, high)

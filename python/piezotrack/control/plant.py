@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import given_or
+from .._support.arguments import expect, given_or
 from ..errors import ParameterError
 from ..identification.fitted.identified_model import IdentifiedModel
 from ..stages.base import Stage
@@ -51,11 +51,12 @@ def plant_of(stage: Plant | IdentifiedModel) -> VirtualStage:
     """
     if isinstance(stage, VirtualStage):
         return stage
-    if not isinstance(stage, (Stage, IdentifiedModel)):
-        raise ParameterError(
-            f"stage is {type(stage).__name__}: expected a pt.VirtualStage, a stage of a model, as "
-            "a pt.DahlStage, or an identified one"
-        )
+    expect(
+        "stage",
+        stage,
+        (Stage, IdentifiedModel),
+        "a stage or an identified model",
+    )
     return VirtualStage.of(stage)
 
 
@@ -90,8 +91,7 @@ def timing_on(plant: VirtualStage, timing: Timing | None, limits: tuple[float, f
     if plant.preconditioning is not None:
         if before:
             raise ParameterError(
-                f"voltages_before is {before}: expected none, this virtual stage has its "
-                "preconditioning"
+                "voltages_before", before, "none, this virtual stage has its preconditioning"
             )
         return given
     low, high = limits

@@ -144,12 +144,12 @@ class Columns(list[Column]):
         """
         units = {} if units is None else units
         if not isinstance(units, Mapping):
-            raise ParameterError(
-                f"units is {quoted(units)}: expected a mapping of columns to units"
-            )
+            raise ParameterError("units", quoted(units), "a mapping of columns to units")
         for key, unit in units.items():
             if not isinstance(unit, str):
-                raise ParameterError(f"units has {quoted(unit)} for {quoted(key)}: expected text")
+                raise ParameterError(
+                    "units", f"{quoted(unit)} for {quoted(key)}", "text", verb="has"
+                )
             if key not in QUANTITIES:
                 self._set_unit(self._find(key, "units"), unit)
         roles = {role: self._find(key, role) for role, key in wanted.items() if key is not None}
@@ -168,7 +168,9 @@ class Columns(list[Column]):
                 roles[role] = self._only(found, role)
         roles = {role: roles[role] for role in wanted if role in roles}
         if len({column.index for column in roles.values()}) < len(roles):
-            raise ParameterError(f"{', '.join(roles)}: two of them are the same column")
+            raise ParameterError(
+                ", ".join(roles), "the same column twice", "different ones", verb="name"
+            )
         for role in roles:
             if role in units:
                 roles[role] = self._set_unit(roles[role], units[role])
@@ -210,7 +212,8 @@ class Columns(list[Column]):
         there = self._nearest(str(key), found or self)
         names = _titles(there) if self.has_titles else f"0 to {len(self) - 1}, without titles"
         those = "they" if found else "the columns"
-        raise ParameterError(f"{argument}: {quoted(key)} {problem}; {those} are {names}")
+        words = f"{argument}: {quoted(key)} {problem}; {those} are {names}"
+        raise ParameterError(words, argument=argument)
 
     def _nearest(self, key: str, columns: Sequence[Column]) -> Sequence[Column]:
         """Put the columns with names like `key` first, where a message cannot take all."""

@@ -122,7 +122,7 @@ class Dataset(Viewed):
         one_of("hold", hold, ("foh", "zoh"))
         for name, text in (("drive_unit", drive_unit), ("source", source or "")):
             if not isinstance(text, str):
-                raise ParameterError(f"{name} is {quoted(text)}: expected text")
+                raise ParameterError(name, quoted(text), "text")
         # The arrays hold the warm-up and the window, which begins at sample `_start`.
         self._u = signal_of("u", u)
         self._y = signal_of("y", y, like=self._u)
@@ -353,12 +353,14 @@ class Dataset(Viewed):
     def __getitem__(self, window: slice) -> Dataset:
         if not isinstance(window, slice):
             raise ParameterError(
-                f"{quoted(window)} is not a slice: a dataset is sliced in seconds, as in "
-                "log[3.0:23.0]; for single samples use log.u, log.y and log.t"
+                "window",
+                quoted(window),
+                "a slice in seconds, as in log[3.0:23.0]; for single samples use log.u, log.y and "
+                "log.t",
             )
         if window.step is not None:
             raise ParameterError(
-                f"the slice has a step of {quoted(window.step)}: expected log[start:stop], in s"
+                "window", f"a step of {quoted(window.step)}", "log[start:stop], in s", verb="has"
             )
         first, stop = self._samples(window.start, window.stop)
         return self._part(0, stop, start=first)

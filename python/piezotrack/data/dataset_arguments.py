@@ -36,7 +36,7 @@ def decimation_factor(value: object, count: int) -> int:
     factor = _factor(value)
     if count < MIN_SAMPLES * factor:
         raise ParameterError(
-            f"factor is {quoted(factor)}: that leaves fewer than {MIN_SAMPLES} of {count} samples"
+            "factor", quoted(factor), f"one that leaves {MIN_SAMPLES} of {count} samples or more"
         )
     return factor
 
@@ -45,18 +45,20 @@ def interpolation_factor(value: object, count: int, hold: str) -> int:
     """Check how many samples each of `count` becomes, and that there is something between them."""
     factor = _factor(value)
     if hold == "zoh":
-        raise ParameterError("hold is 'zoh': expected 'foh', as nothing is between the samples")
+        raise ParameterError("hold", "'zoh'", "'foh', as nothing is between the samples")
     if (count - 1) * factor + 1 > MOST_SAMPLES:
         raise ParameterError(
-            f"factor is {quoted(factor)}: expected at most {(MOST_SAMPLES - 1) // (count - 1)}, "
-            f"with which {count} samples become {MOST_SAMPLES}"
+            "factor",
+            quoted(factor),
+            f"at most {(MOST_SAMPLES - 1) // (count - 1)}, with which {count} samples become "
+            f"{MOST_SAMPLES}",
         )
     return factor
 
 
 def _factor(value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral) or value < 2:
-        raise ParameterError(f"factor is {quoted(value)}: expected a whole number, 2 or more")
+        raise ParameterError("factor", quoted(value), "a whole number, 2 or more")
     return int(value)
 
 
@@ -64,9 +66,7 @@ def _time_limit(name: str, value: object) -> float:
     """Check a limit of a window of time [s]."""
     number = real(value)
     if not math.isfinite(number):
-        raise ParameterError(
-            f"{name} is {quoted(value)}: expected a finite number of seconds or None"
-        )
+        raise ParameterError(name, quoted(value), "a finite number of seconds or None")
     return number
 
 
@@ -77,17 +77,18 @@ def further_columns(
     columns, units = columns or {}, units or {}
     for argument, mapping in (("columns", columns), ("column_units", units)):
         if not isinstance(mapping, Mapping):
-            raise ParameterError(f"{argument} is {quoted(mapping)}: expected a mapping by name")
+            raise ParameterError(argument, quoted(mapping), "a mapping by name")
     for name in (*columns, *units):
         if name not in columns or not isinstance(name, str):
             known = listed(list(columns)) or "none"
             raise ParameterError(
-                f"{quoted(name)} is not the name of a column: the names are {known}"
+                f"{quoted(name)} is not the name of a column: the names are {known}",
+                argument="column_units" if name in units else "columns",
             )
     for name, unit in units.items():
         if not isinstance(unit, str):
             raise ParameterError(
-                f"column_units has {quoted(unit)} for {quoted(name)}: expected text"
+                "column_units", f"{quoted(unit)} for {quoted(name)}", "text", verb="has"
             )
     kept = {
         name: signal_of(f"column {quoted(name)}", values, like=u, finite=False)
@@ -106,11 +107,12 @@ def window_samples(t: Array, dt: float, start: float | None, stop: float | None)
     window = f"the window from {begin:.10g} s to {end:.10g} s"
     record = f"the record, whose samples go from {low:.10g} s to {float(t[-1]):.10g} s"
     if begin < low - dt / 2 or end > high + dt / 2:
-        raise ParameterError(f"{window} reaches out of {record}")
+        raise ParameterError(f"{window} reaches out of {record}", argument="window")
     if begin >= end:
-        raise ParameterError(f"{window} is empty: expected start < stop within {record}")
+        expected = f"start < stop within {record}"
+        raise ParameterError(window, "empty", expected, argument="window")
     first, last = (int(np.searchsorted(t, bound - slack)) for bound in (begin, end))
     if last - first < MIN_SAMPLES:
         few = f"holds {last - first} samples: expected at least {MIN_SAMPLES}"
-        raise ParameterError(f"{window} {few}, within {record}")
+        raise ParameterError(f"{window} {few}, within {record}", argument="window")
     return first, last

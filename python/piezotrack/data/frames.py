@@ -66,7 +66,7 @@ def signals_of_frame(
     # A record has further columns, which are a mapping.
     if isinstance(getattr(frame, "columns", {}), Mapping):
         raise ParameterError(
-            f"frame is {quoted(type(frame).__name__)}: expected a data frame with named columns"
+            "frame", quoted(type(frame).__name__), "a data frame with named columns"
         )
     titles = list(frame.columns)
     columns = Columns([str(title) for title in titles], has_titles=True)

@@ -75,7 +75,7 @@ def save_log(log: Signals, path: str | os.PathLike[str]) -> Path:
     try:
         file = Path(path)
     except TypeError:
-        raise ParameterError(f"path is {quoted(path)}: expected the name of a file") from None
+        raise ParameterError("path", quoted(path), "the name of a file") from None
     known = format_to_write(file)
     columns = [
         WrittenColumn("time", "s", log.t, "time_s"),
@@ -98,7 +98,8 @@ def format_to_write(file: Path) -> Format:
         if ending in known.endings:
             return known
     endings = ", ".join(known.endings[0] for known in written)
-    raise ParameterError(f"{file.name}: expected an ending of a format that is written: {endings}")
+    words = f"{file.name}: expected an ending of a format that is written: {endings}"
+    raise ParameterError(words, argument="path")
 
 
 def _drive(log: Signals) -> WrittenColumn:

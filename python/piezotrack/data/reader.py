@@ -111,7 +111,9 @@ def read(
     roles = log.roles({"time": time, "drive": drive, "displacement": displacement}, units, dt)
     if resample is not None:
         if dt is not None:
-            raise ParameterError("dt and resample: expected one of them at most, both are given")
+            raise ParameterError(
+                "dt and resample: expected one of them at most, both are given", argument="dt"
+            )
         check_dt(resample, "resample")
     return log.dataset(roles, dt, hold, resample)
 

@@ -105,8 +105,10 @@ def even_times(t: Array, interval: float) -> Array:
     shortest = length / MOST_SAMPLES
     if not shortest < interval <= longest * (1.0 + 1e-6):
         raise ParameterError(
-            f"resample is {interval:g} s: expected {shortest:.3g} s to {longest:.6g} s, than which "
-            "half of the intervals of the log are not shorter; decimate() goes further"
+            "resample",
+            f"{interval:g} s",
+            f"{shortest:.3g} s to {longest:.6g} s, than which half of the intervals of the log "
+            "are not shorter; decimate() goes further",
         )
     count = math.floor(length / interval * (1.0 + 1e-12)) + 1
     times: Array = np.minimum(t[0] + interval * np.arange(count), t[-1])

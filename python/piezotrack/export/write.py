@@ -151,7 +151,7 @@ def export_controller(
     played = feedforward_table(controller, reference, table)
     if to == "json":
         if single:
-            raise ParameterError("single is True with to='json': expected False, JSON has doubles")
+            raise ParameterError("single", "True with to='json'", "False, JSON has doubles")
         document = coefficients_document(controller, played)
         path = write_document(make_folder(folder) / names[0], document)
         left_out = controller.feedforward is not None and played is None
@@ -159,7 +159,7 @@ def export_controller(
     if to == "library":
         if single:
             raise ParameterError(
-                "single is True with to='library': expected False, the library has doubles"
+                "single", "True with to='library'", "False, the library has doubles"
             )
         texts = library_sources(controller, name, table=played, reference=reference)
         paths = _written({key: text.encode() for key, text in texts.items()}, folder)

@@ -61,15 +61,15 @@ def connect(address: str) -> Device:
     """
     known = ", ".join(f"{name}:..." for name in schemes())
     if not isinstance(address, str):
-        raise ParameterError(f"device is {quoted(address)}: expected an address, one of {known}")
+        raise ParameterError("device", quoted(address), f"an address, one of {known}")
     try:
         parts = urlsplit(address)
         host, port = parts.hostname, parts.port
     except ValueError as error:
-        raise ParameterError(f"device is {quoted(address)}: {error}") from None
+        raise ParameterError("device", quoted(address), f"an address ({error})") from None
     named = [entry for entry in _entries() if entry.name == parts.scheme]
     if not named:
-        raise ParameterError(f"device is {quoted(address)}: expected an address, one of {known}")
+        raise ParameterError("device", quoted(address), f"an address, one of {known}")
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     # No other package replaces a scheme of this one.
     entry = min(named, key=lambda entry: (entry.module.partition(".")[0] != OWN, entry.value))

@@ -53,13 +53,13 @@ class Rates:
             object.__setattr__(self, name, positive(name, getattr(self, name), "Hz"))
         if self.highest < self.lowest:
             raise ParameterError(
-                f"highest is {self.highest:g} Hz: expected at least lowest, {self.lowest:g} Hz"
+                "highest", f"{self.highest:g} Hz", f"at least lowest, {self.lowest:g} Hz"
             )
         if self.clock is not None:
             clock = positive("clock", self.clock, "Hz")
             if clock < self.highest:
                 raise ParameterError(
-                    f"clock is {clock:g} Hz: expected at least highest, {self.highest:g} Hz"
+                    "clock", f"{clock:g} Hz", f"at least highest, {self.highest:g} Hz"
                 )
             object.__setattr__(self, "clock", clock)
 
@@ -85,8 +85,9 @@ class Rates:
         near = 1e-9 * rate
         if not self.lowest - near <= rate <= self.highest + near:
             raise ParameterError(
-                f"rate is {rate:g} Hz: expected {self.lowest:g} to {self.highest:g} Hz, the rates "
-                "of the device"
+                "rate",
+                f"{rate:g} Hz",
+                f"{self.lowest:g} to {self.highest:g} Hz, the rates of the device",
             )
         if self.clock is None:
             return rate
@@ -138,8 +139,9 @@ class Record:
         given = signal_of("displacement", self.displacement, finite=False)
         if given.size != self.volts.size:
             raise ShapeError(
-                f"displacement has {given.size} samples: expected {self.volts.size}, as many as "
-                "were played"
+                "displacement",
+                f"{given.size} samples",
+                f"{self.volts.size}, as many as were played",
             )
         object.__setattr__(self, "displacement", given)
         object.__setattr__(self, "rate", positive("rate", self.rate, "Hz"))

@@ -70,7 +70,7 @@ class Drive:
     def __post_init__(self) -> None:
         expect("name", self.name, str, "a text")
         if not callable(self.at):
-            raise ParameterError(f"at is {quoted(self.at)}: expected a function of times [s]")
+            raise ParameterError("at", quoted(self.at), "a function of times [s]")
 
     def __repr__(self) -> str:
         return f"Drive({self.name}, {plain(self.duration)} s)"
@@ -100,8 +100,10 @@ class Drive:
         count = self.count(dt)
         if self.frequency is not None and 2.0 * self.frequency * dt > 1.0 + 1e-9:
             raise ParameterError(
-                f"drive ({self.name}) goes up to {plain(self.frequency)} Hz: expected at most half "
-                f"the rate, {plain(0.5 / dt)} Hz"
+                f"drive ({self.name})",
+                f"up to {plain(self.frequency)} Hz",
+                f"at most half the rate, {plain(0.5 / dt)} Hz",
+                verb="goes",
             )
         volts = np.asarray(self.at(dt * np.arange(count, dtype=np.float64)), dtype=np.float64)
         return np.broadcast_to(volts, (count,)).copy()
@@ -148,12 +150,13 @@ def decaying(
     frequency = hertz("frequency", frequency)
     bottom, top = finite("low", low, "V"), finite("high", high, "V")
     if not bottom < top:
-        raise ParameterError(f"low is {bottom:g} V: expected less than high, {top:g} V")
+        raise ParameterError("low", f"{bottom:g} V", f"less than high, {top:g} V")
     length = DECAY / frequency if duration is None else positive("duration", duration, "s")
     if not 1.0 <= length * frequency <= MOST_TURNS:
         raise ParameterError(
-            f"duration is {length:g} s: expected {1.0 / frequency:g} to {MOST_TURNS / frequency:g} "
-            f"s, 1 to {MOST_TURNS:g} periods"
+            "duration",
+            f"{length:g} s",
+            f"{1.0 / frequency:g} to {MOST_TURNS / frequency:g} s, 1 to {MOST_TURNS:g} periods",
         )
     turns = round(length * frequency)
 
@@ -190,7 +193,7 @@ def _in_volts(waveform: Callable[..., Reference], word: str) -> Callable[..., Dr
 
     def make(*, low: float = math.nan, high: float = math.nan, **others: Any) -> Drive:
         if low >= high:
-            raise ParameterError(f"low is {low:g} V: expected less than high, {high:g} V")
+            raise ParameterError("low", f"{low:g} V", f"less than high, {high:g} V")
         if "levels" in others:
             others["levels"] = [METRES_PER_VOLT * one for one in others["levels"]]
         else:

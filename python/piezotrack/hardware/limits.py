@@ -30,7 +30,7 @@ def ordered(name: str, pair: tuple[float, float]) -> tuple[float, float]:
     """
     low, high = (finite(name, one, "V") for one in pair)
     if not low < high:
-        raise ParameterError(f"{name} is {low:g} to {high:g} V: expected the lower one first")
+        raise ParameterError(name, f"{low:g} to {high:g} V", "the lower one first")
     return low, high
 
 

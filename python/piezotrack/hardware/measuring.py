@@ -47,8 +47,9 @@ def check_device(device: object) -> None:
     wanted = ("limits", "rates", "memory", "channels", "play", "hold", "close")
     missing = [name for name in wanted if not hasattr(device, name)]
     raise ParameterError(
-        f"device is {type(device).__name__}, without {', '.join(missing)}: expected a "
-        "piezotrack.hardware.Device"
+        "device",
+        f"{type(device).__name__}, without {', '.join(missing)}",
+        "a piezotrack.hardware.Device",
     )
 
 
@@ -59,8 +60,9 @@ def check_table(device: Device, name: str, volts: Array) -> None:
     if beyond.size:
         k = int(beyond[0])
         raise ParameterError(
-            f"{name} is {volts[k]:g} V at sample {k}: expected {low:g} to {high:g} V, the limits "
-            f"of {device.channels[0]}"
+            name,
+            f"{volts[k]:g} V at sample {k}",
+            f"{low:g} to {high:g} V, the limits of {device.channels[0]}",
         )
     _check_count(device, name, volts.size)
 
@@ -68,8 +70,11 @@ def check_table(device: Device, name: str, volts: Array) -> None:
 def _check_count(device: Device, name: str, count: int) -> None:
     if count > device.memory:
         raise ParameterError(
-            f"{name} has {count} samples: expected at most {device.memory}, the memory of "
-            f"{device.channels[0]}; a lower rate or a shorter drive fits"
+            name,
+            f"{count} samples",
+            f"at most {device.memory}, the memory of {device.channels[0]}; a lower rate or a "
+            "shorter drive fits",
+            verb="has",
         )
 
 
@@ -141,8 +146,9 @@ def ramped(
     """
     if ramp * rate > device.memory:
         raise ParameterError(
-            f"ramp is {ramp:g} s: expected at most {device.memory / rate:g} s, which the memory "
-            f"of {device.channels[0]} holds"
+            "ramp",
+            f"{ramp:g} s",
+            f"at most {device.memory / rate:g} s, which the memory of {device.channels[0]} holds",
         )
     count = max(2, round(ramp * rate))
     # The share of a smooth step: no jump of the acceleration excites a mode.
@@ -223,13 +229,16 @@ def measure(
         volts = drive.sample(1.0 / obtained)
     elif notes:
         raise ParameterError(
-            f"rate is {rate:g} Hz: expected {obtained:.9g} Hz, which the device plays at, or a "
-            "drive as a function of time"
+            "rate",
+            f"{rate:g} Hz",
+            f"{obtained:.9g} Hz, which the device plays at, or a drive as a function of time",
         )
     else:
         volts = np.array(signal_of("drive", drive))
     if volts.size < MIN_SAMPLES:
-        raise ParameterError(f"drive has {volts.size} samples: expected at least {MIN_SAMPLES}")
+        raise ParameterError(
+            "drive", f"{volts.size} samples", f"at least {MIN_SAMPLES}", verb="has"
+        )
     low, high = device.limits
     if _core.as_truth("clip", clip) and (beyond := int(np.sum((volts < low) | (volts > high)))):
         volts = np.clip(volts, low, high)

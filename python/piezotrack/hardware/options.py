@@ -41,7 +41,7 @@ class Options:
         """Return a text; where there is no default it has to be given."""
         found = self._left.pop(name, None) or default
         if found is None:
-            raise ParameterError(f"device has no {name}: expected {self._form}")
+            raise ParameterError("device", f"no {name}", self._form, verb="has")
         return found
 
     def optional(self, name: str) -> str | None:
@@ -81,15 +81,17 @@ class Options:
             return default
         number = self._numbers(name, "number", "")[0]
         if not isinstance(number, int):
-            raise ParameterError(f"device has {name}={number}: expected a whole number")
+            raise ParameterError("device", f"{name}={number}", "a whole number", verb="has")
         return number
 
     def done(self) -> None:
         """Refuse what is left."""
         if self._left:
             raise ParameterError(
-                f"device has {quoted(next(iter(self._left)))}, which it does not know: expected "
-                f"{self._form}"
+                "device",
+                f"{quoted(next(iter(self._left)))}, which it does not know",
+                self._form,
+                verb="has",
             )
 
     def _numbers(self, name: str, quantity: str, join: str) -> list[float]:
@@ -107,7 +109,7 @@ class Options:
         self, name: str, text: str, form: str, error: ParameterError | None
     ) -> ParameterError:
         why = "" if error is None else f" ({error})"
-        return ParameterError(f"device has {name}={quoted(text)}{why}: expected {form}")
+        return ParameterError("device", f"{name}={quoted(text)}{why}", form, verb="has")
 
 
 def required_package(module: str, extra: str, what: str) -> Any:

@@ -89,8 +89,9 @@ def round_trip(device: Exchanging, volts: float, count: int = 1000) -> RoundTrip
     """
     if not isinstance(device, Exchanging):
         raise ParameterError(
-            f"device is {type(device).__name__}, without exchange: expected a "
-            "piezotrack.hardware.Exchanging"
+            "device",
+            f"{type(device).__name__}, without exchange",
+            "a piezotrack.hardware.Exchanging",
         )
     volts, times = finite("volts", volts, "V"), []
     for _ in range(_core.as_count("count", count)):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import finite, not_negative
+from .._support.arguments import expect, finite, not_negative
 from .._support.arrays import signal_of
 from ..errors import DeviceError, ParameterError
 from ..identification.fitted.model_file import load
@@ -73,11 +73,12 @@ class VirtualDevice:
         memory: int = MEMORY,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        if not isinstance(stage, VirtualStage):
-            raise ParameterError(
-                f"stage is {type(stage).__name__}: expected pt.VirtualStage, as VirtualStage.of "
-                "makes one of any model"
-            )
+        expect(
+            "stage",
+            stage,
+            VirtualStage,
+            "pt.VirtualStage, as VirtualStage.of makes it",
+        )
         self._limits = ordered("limits", stage.amplifier.limits if limits is None else limits)
         self._rates, self._memory = rates, _core.as_count("memory", memory)
         self._clock = clock
@@ -174,7 +175,7 @@ def from_address(
 ) -> VirtualDevice:
     """Make the virtual stage of an address: ``virtual:`` or ``virtual:MODEL.json``."""
     if host or port or options:
-        raise ParameterError("device is a virtual stage: expected virtual: or virtual:MODEL.json")
+        raise ParameterError("device", "a virtual stage", "virtual: or virtual:MODEL.json")
     stage, limits = virtual_stage(path or None)
     return VirtualDevice(stage, limits=limits)
 
@@ -206,7 +207,6 @@ def virtual_stage(path: str | Path | None) -> tuple[VirtualStage, tuple[float, f
     known = load(path)
     if known.drive_unit != "V":
         raise ParameterError(
-            f"device {path}: its drive is in {known.drive_unit}: expected a stage that a voltage "
-            "drives"
+            f"device {path}", f"driven in {known.drive_unit}", "a stage that a voltage drives"
         )
     return VirtualStage.of(known), known.drive_range

@@ -201,9 +201,9 @@ def identify(
         for name, value in (("callback", callback), ("checkpoint", checkpoint)):
             if value is not None:
                 raise ParameterError(
-                    f"{name} is {quoted(value)}: expected none with the model '{model}', whose "
-                    "parameters follow by least squares",
-                    argument=name,
+                    name,
+                    quoted(value),
+                    f"none with the model '{model}', whose parameters follow by least squares",
                 )
     run = Run(threads=0 if threads is None else threads, progress=progress, callback=callback)
     with checkpoint_of(checkpoint, problem, methods) as kept:

@@ -49,7 +49,7 @@ def _times(t: object) -> Array:
     """Check times [s]: numbers that are finite, and whose squares are."""
     times = real_array("t", t)
     if not (np.abs(times) < LARGEST).all():
-        raise ParameterError(f"t is {quoted(t)}: expected times in s, below {LARGEST:g} s")
+        raise ParameterError("t", quoted(t), f"times in s, below {LARGEST:g} s")
     return times
 
 
@@ -292,7 +292,8 @@ def extremes(
     if not periods * cosines <= MOST_PERIODS:
         raise ParameterError(
             f"the motion has {periods:.3g} of its shortest periods, {shortest:g} s, in "
-            f"{duration:g} s: expected at most {MOST_PERIODS // cosines} to find its range"
+            f"{duration:g} s: expected at most {MOST_PERIODS // cosines} to find its range",
+            argument="duration",
         )
     with np.errstate(all="ignore"):
         return _extremes(motion, duration, shortest / POINTS)

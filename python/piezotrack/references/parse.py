@@ -178,10 +178,10 @@ def made_from_text(
     """Parse a text, or read the file that it names; `others` are values that it may leave out."""
     examples = ", ".join(kind.example for kind in kinds.values())
     if not isinstance(text, str) or not text.strip():
-        raise ParameterError(f"{what} is {quoted(text)}: expected a file or one of {examples}")
+        raise ParameterError(what, quoted(text), f"a file or one of {examples}")
     if len(text) > MOST_LETTERS:
         raise ParameterError(
-            f"{what} {quoted(text)} has {len(text)} letters: expected {MOST_LETTERS} at most"
+            f"{what} {quoted(text)}", f"{len(text)} letters", f"{MOST_LETTERS} at most", verb="has"
         )
     name, colon, rest = (part.strip() for part in text.partition(":"))
     kind = kinds.get(name.lower())
@@ -192,8 +192,9 @@ def made_from_text(
         if is_there or (is_path and Path(text).suffix):
             return read(text, duration=duration)
         raise ParameterError(
-            f"{what} {quoted(text)} is neither a file nor a known kind: expected a file or one of "
-            f"{examples}"
+            f"{what} {quoted(text)}",
+            "neither a file nor a known kind",
+            f"a file or one of {examples}",
         )
     try:
         values = {**others, **_values(kind, rest)}
@@ -206,7 +207,7 @@ def made_from_text(
             raise ParameterError(f"there is no {called}: {kind.expected}")
         return kind.make(**values)
     except ParameterError as error:
-        raise ParameterError(f"{what} {quoted(text)}: {error}") from None
+        raise error.of(f"{what} {quoted(text)}", argument=what) from None
 
 
 def _values(kind: Kind, text: str) -> dict[str, Any]:
@@ -221,7 +222,7 @@ def _values(kind: Kind, text: str) -> dict[str, Any]:
         if equals and quantity != (wanted := kind.keywords[keyword]):
             units = UNITS[wanted]
             raise ParameterError(
-                f"{quoted(item)} has the wrong unit: expected {wanted}, unit {units}"
+                quoted(item), "the wrong unit", f"{wanted}, unit {units}", verb="has"
             )
         if equals and join != ("/" if keyword in LISTS else ""):
             raise ParameterError(f"{quoted(item)} cannot be understood: {kind.expected}")
@@ -239,7 +240,7 @@ def _values(kind: Kind, text: str) -> dict[str, Any]:
 def numbers_with_unit(text: str) -> tuple[list[float], str, str]:
     """Parse one value or several: the numbers in SI, their quantity and their separator."""
     if "..." in text:
-        raise ParameterError(f"{quoted(text)} has three dots: expected two, as in 0..110um")
+        raise ParameterError(quoted(text), "three dots", "two, as in 0..110um", verb="has")
     join = next((mark for mark in ("..", "/") if mark in text), "")
     found = []
     for part in text.split(join) if join else [text]:
@@ -251,7 +252,7 @@ def numbers_with_unit(text: str) -> tuple[list[float], str, str]:
         found.append((float(match[1]), match[2]))
     if join == ".." and len(found) != 2:
         raise ParameterError(
-            f"{quoted(text)} has {len(found)} values: expected two, as in 0..110um"
+            quoted(text), f"{len(found)} values", "two, as in 0..110um", verb="has"
         )
     # The last unit counts for the values before it that have none.
     units = [_unit(name or found[-1][1]) for _, name in found]
@@ -376,8 +377,9 @@ def parse_path(
     """
     if duration is not None and str(text).strip().lower().startswith("spiral:"):
         raise ParameterError(
-            f"duration is {quoted(duration)}: expected none, as radius, pitch and frequency of a "
-            "spiral are its length"
+            "duration",
+            quoted(duration),
+            "none, as radius, pitch and frequency of a spiral are its length",
         )
     others: dict[str, Any] = {"origin": origin}
     if centre is not None:

@@ -139,7 +139,7 @@ def lissajous(
     cx, cy = _pair("centre", centre)
     period = common_period((fx, fy))
     if period == math.inf:
-        raise ParameterError(f"frequencies are {fx:g} and {fy:g} Hz: expected a common period")
+        raise ParameterError("frequencies", f"{fx:g} and {fy:g} Hz", "a common period", verb="are")
     quarter = 0.5 * math.pi
     motions = (
         Cosines(cx, (a,), (fx,), (finite("phase", phase, "rad") - quarter,)),
@@ -204,10 +204,10 @@ def raster(
     cx, cy = _pair("centre", centre)
     count = _core.as_count("lines", lines)
     if not 2 <= count <= 100_000:
-        raise ParameterError(f"lines is {count}: expected a whole number from 2 to 100000")
+        raise ParameterError("lines", count, "a whole number from 2 to 100000")
     share = in_range("flyback", flyback, 0.9, "parts of a line's time")
     if share < 0.05:
-        raise ParameterError(f"flyback is {share:g}: expected 0.05 of a line's time or more")
+        raise ParameterError("flyback", f"{share:g}", "0.05 of a line's time or more")
     line = 1.0 / rate
     motions = (
         _Trace(cx - 0.5 * width, width, line, share * line),
@@ -267,10 +267,10 @@ def spiral(
     frequency = hertz("frequency", frequency)
     radius, pitch = _size("radius", radius), _size("pitch", pitch)
     if pitch >= radius:
-        raise ParameterError(f"pitch is {pitch:g}: expected less than the radius, {radius:g} m")
+        raise ParameterError("pitch", f"{pitch:g}", f"less than the radius, {radius:g} m")
     if radius > MOST_TURNS * pitch:
         raise ParameterError(
-            f"pitch is {pitch:g} m, for {radius / pitch:g} turns: expected at most {MOST_TURNS}"
+            "pitch", f"{pitch:g} m, for {radius / pitch:g} turns", f"at most {MOST_TURNS}"
         )
     cx, cy = _pair("centre", centre)
     motions = (
@@ -390,9 +390,7 @@ def _pair(name: str, values: Sequence[float]) -> tuple[float, float]:
     try:
         first, second = values
     except (TypeError, ValueError):
-        raise ParameterError(
-            f"{name} is {quoted(values)}: expected two numbers, for x and y"
-        ) from None
+        raise ParameterError(name, quoted(values), "two numbers, for x and y") from None
     return finite(f"{name}[0]", first, "SI units"), finite(f"{name}[1]", second, "SI units")
 
 

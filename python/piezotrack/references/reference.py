@@ -136,7 +136,7 @@ class Reference:
 
     def __post_init__(self) -> None:
         if not callable(self.motion):
-            raise ParameterError(f"motion is {quoted(self.motion)}: expected a function of times")
+            raise ParameterError("motion", quoted(self.motion), "a function of times")
         duration = positive("duration", self.duration, "s")
         numbers = {
             "duration": duration,
@@ -151,7 +151,7 @@ class Reference:
         for name, number in numbers.items():
             object.__setattr__(self, name, number)
         if self.low > self.high:
-            raise ParameterError(f"low is {self.low:g}: expected at most high, {self.high:g} m")
+            raise ParameterError("low", f"{self.low:g}", f"at most high, {self.high:g} m")
 
     def at(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Return the motion at any times.
@@ -188,13 +188,14 @@ class Reference:
         try:
             times = real_array("t", t)
         except (DataError, ShapeError):
-            raise ParameterError(f"t is {quoted(t)}: expected times in s") from None
+            raise ParameterError("t", quoted(t), "times in s") from None
         slack = 1e-12 * self.duration
         outside = ~((times >= -slack) & (times <= self.duration + slack))
         if outside.any():
             raise ParameterError(
-                f"t is {float(times[outside][0]):.10g} s: expected times within the reference, "
-                f"from 0 to {self.duration:.10g} s"
+                "t",
+                f"{float(times[outside][0]):.10g} s",
+                f"times within the reference, from 0 to {self.duration:.10g} s",
             )
         inside = np.clip(np.atleast_1d(times), 0.0, self.duration)
         x, v, a = self._finite(inside, self.ramp)
@@ -209,8 +210,9 @@ class Reference:
         if not good.all():
             k = int(np.argmin(good))
             raise ParameterError(
-                f"motion of {self.name} is {x.flat[k]:g} m, {v.flat[k]:g} m/s, {a.flat[k]:g} "
-                f"m/s^2 at {t.flat[k]:.10g} s: expected finite numbers"
+                f"motion of {self.name}",
+                f"{x.flat[k]:g} m, {v.flat[k]:g} m/s, {a.flat[k]:g} m/s^2 at {t.flat[k]:.10g} s",
+                "finite numbers",
             )
         return x, v, a
 
@@ -223,8 +225,10 @@ class Reference:
             x = v = a = np.zeros(0)
         if not (x.shape == v.shape == a.shape == t.shape):
             raise ParameterError(
-                f"motion of {self.name} returns {quoted(parts)} for times of the shape {t.shape}: "
-                "expected displacement, velocity and acceleration, each of that shape"
+                f"motion of {self.name}",
+                f"{quoted(parts)} for times of the shape {t.shape}",
+                "displacement, velocity and acceleration, each of that shape",
+                verb="returns",
             )
         return x, v, a
 
@@ -257,18 +261,21 @@ class Reference:
         interval = check_dt(dt)
         if self.shortest > 0.0 and 2.0 * interval > self.shortest * (1.0 + 1e-9):
             raise ParameterError(
-                f"dt is {interval:g} s: expected at most {0.5 * self.shortest:g} s, two samples "
-                f"in the shortest period of the reference ({self.name}), {self.shortest:g} s"
+                "dt",
+                f"{interval:g} s",
+                f"at most {0.5 * self.shortest:g} s, two samples in the shortest period of the "
+                f"reference ({self.name}), {self.shortest:g} s",
             )
         count = math.ceil(min(self.duration / interval, 2.0 * MOST_SAMPLES) - ROUNDING)
         if count > MOST_SAMPLES:
             raise ParameterError(
-                f"dt is {interval:g} s: expected at most {MOST_SAMPLES} samples in the reference's "
-                f"{self.duration:g} s"
+                "dt",
+                f"{interval:g} s",
+                f"at most {MOST_SAMPLES} samples in the reference's {self.duration:g} s",
             )
         if count < 2:
             raise ParameterError(
-                f"dt is {interval:g} s: expected less than the reference's {self.duration:g} s"
+                "dt", f"{interval:g} s", f"less than the reference's {self.duration:g} s"
             )
         t: Array = interval * np.arange(count, dtype=np.float64)
         x, v, a = self.at(t)
@@ -346,8 +353,10 @@ class Reference:
             turn = period / dt
             if not 2.0 - ROUNDING <= turn <= values.size + ROUNDING:
                 raise ParameterError(
-                    f"period is {period:g} s: expected at least two samples, {2.0 * dt:g} s, and "
-                    f"at most the length of the record, {record:g} s"
+                    "period",
+                    f"{period:g} s",
+                    f"at least two samples, {2.0 * dt:g} s, and at most the length of the "
+                    f"record, {record:g} s",
                 )
             closing = abs(values[-1] - values[0]) <= 1e-6 * np.ptp(values)
             if closing and abs(turn - (values.size - 1)) <= ROUNDING:
@@ -358,8 +367,10 @@ class Reference:
         length = record if duration is None else positive("duration", duration, "s")
         if not cyclic and length > record + ROUNDING * dt:
             raise ParameterError(
-                f"duration is {length:g} s: expected at most the length of the record, "
-                f"{record:g} s; only samples of one period, with period=, go on"
+                "duration",
+                f"{length:g} s",
+                f"at most the length of the record, {record:g} s; only samples of one period, "
+                "with period=, go on",
             )
         motion = Spline(values, dt, cyclic)
         low, high = extremes(motion, min(length, record), 8.0 * dt)
@@ -440,4 +451,4 @@ def read_reference(
             record.y, record.dt, period=period, duration=duration, ramp=ramp, name=name
         )
     except (DataError, ParameterError) as error:
-        raise type(error)(f"{name}: {error}") from None
+        raise error.of(name) from None

@@ -220,12 +220,13 @@ def staircase(
     if (steps is None) == (levels is None):
         raise ParameterError(
             "steps and levels: expected exactly one of them, "
-            f"{'neither is' if steps is None else 'both are'} given"
+            f"{'neither is' if steps is None else 'both are'} given",
+            argument="steps",
         )
     if levels is None:
         count = _core.as_count("steps", steps)
         if not 1 <= count <= 10**6:
-            raise ParameterError(f"steps is {count}: expected a whole number from 1 to 1000000")
+            raise ParameterError("steps", count, "a whole number from 1 to 1000000")
         low, high = bounds(low, high)
         up = np.linspace(low, high, count + 1)
         places = np.concatenate([up, up[-2:0:-1]])
@@ -233,7 +234,7 @@ def staircase(
         period, record = 2 * count * (dwell + rise), 2 * count * (dwell + rise)
     else:
         if low is not None or high is not None:
-            raise ParameterError("low and high come with steps: expected levels without them")
+            raise ParameterError("low or high", "given", "levels without them")
         places = numbers("levels", levels, "m", least=2)
         low, high = float(places.min()), float(places.max())
         check_reach(low, high)
@@ -373,26 +374,29 @@ def multisine(
     lines = lines[order]
     if (np.diff(lines) == 0.0).any():
         twice = lines[:-1][np.diff(lines) == 0.0][0]
-        raise ParameterError(f"frequencies has {twice:g} Hz twice: expected different ones")
+        raise ParameterError("frequencies", f"{twice:g} Hz twice", "different ones", verb="has")
     duration = positive("duration", duration, "s")
     is_fitted = low is not None and high is not None and offset is None
     is_given = low is None and high is None and offset is not None and amplitudes is not None
     if not (is_fitted or is_given):
         raise ParameterError(
             "expected either low and high (with amplitudes as ratios, if they differ) or offset "
-            "and amplitudes"
+            "and amplitudes",
+            argument="amplitudes",
         )
     sizes = np.ones(lines.size)
     if amplitudes is not None:
         given = numbers("amplitudes", amplitudes, "m, or ratios", above=0.0)
         if given.size not in (1, lines.size):
             raise ShapeError(
-                f"amplitudes has {given.size} entries: expected one, or {lines.size} like "
-                "frequencies"
+                "amplitudes", f"{given.size} entries", f"one, or {lines.size} like frequencies"
             )
         if not (given < MOST_AMPLITUDE).all():
             raise ParameterError(
-                f"amplitudes has {given.max():g}: expected m, or ratios, below {MOST_AMPLITUDE:g}"
+                "amplitudes",
+                f"{given.max():g}",
+                f"m, or ratios, below {MOST_AMPLITUDE:g}",
+                verb="has",
             )
         sizes = np.broadcast_to(given, lines.shape)[order]
     phases = schroeder_phases(sizes)
@@ -405,7 +409,7 @@ def multisine(
     if is_fitted:
         low, high = bounds(low, high)
         if not top > bottom:
-            raise ParameterError(f"duration is {duration:g} s: expected a time in which it moves")
+            raise ParameterError("duration", f"{duration:g} s", "a time in which it moves")
         scale = (high - low) / (top - bottom)
         offset = low - scale * bottom
     else:

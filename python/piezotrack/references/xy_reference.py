@@ -75,15 +75,15 @@ class XYReference:
     def __post_init__(self) -> None:
         for name, axis in (("x", self.x), ("y", self.y)):
             if not isinstance(axis, Reference):
-                raise ParameterError(f"{name} is {type(axis).__name__}: expected pt.Reference")
+                raise ParameterError(name, type(axis).__name__, "pt.Reference")
         for name in ("duration", "period", "ramp"):
             one, other = getattr(self.x, name), getattr(self.y, name)
             if one != other:
                 raise ParameterError(
-                    f"{name} of y is {other} s: expected that of x, {one} s, as both are one path"
+                    f"{name} of y", f"{other} s", f"that of x, {one} s, as both are one path"
                 )
         if (self.radius is None) != (self.centre is None):
-            raise ParameterError("radius and centre: expected both of a circle, or neither")
+            raise ParameterError("radius or centre", "missing", "both of a circle, or neither")
 
     def __repr__(self) -> str:
         size = max(abs(edge) for axis in self.axes for edge in (axis.low, axis.high))
@@ -213,7 +213,7 @@ def square_matrix(name: str, matrix: ArrayLike) -> Array:
     except (DataError, ShapeError):
         rows = np.zeros(0)
     if rows.shape != (2, 2) or not np.isfinite(rows).all():
-        raise ParameterError(f"{name} is {quoted(matrix)}: expected 2 by 2 finite numbers")
+        raise ParameterError(name, quoted(matrix), "2 by 2 finite numbers")
     return rows
 
 

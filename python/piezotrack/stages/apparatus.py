@@ -24,7 +24,7 @@ def _as_numbers(part: object) -> None:
         if one.name == "limits":
             value = one_or_more_numbers(one.name, value)
             if len(value) != 2:
-                raise ParameterError(f"limits are {value}: expected (low, high) in V")
+                raise ParameterError("limits", value, "(low, high) in V", verb="are")
         elif one.name == "seed":
             value = _core.as_count(one.name, value)
         else:
@@ -116,8 +116,10 @@ class Sensor:
         _as_numbers(self)
         if self.noise >= NOT_A_SENSOR:
             raise ParameterError(
-                f"noise is {self.noise:g} m rms: expected metres, and no sensor of a piezo stage "
-                f"is so noisy; {self.noise:g} nm is {self.noise:g}e-9"
+                "noise",
+                f"{self.noise:g} m rms",
+                f"metres, and no sensor of a piezo stage is so noisy; {self.noise:g} nm is "
+                f"{self.noise:g}e-9",
             )
 
     @property

@@ -255,8 +255,9 @@ class Stage:
         if isinstance(initial, self._state):
             return initial
         raise ParameterError(
-            f"initial is {type(initial).__name__}: expected a "
-            f"pt.stages.{self._state.__name__}, as the final of a response"
+            "initial",
+            type(initial).__name__,
+            f"a pt.stages.{self._state.__name__}, as the final of a response",
         )
 
     def inverse(

@@ -128,14 +128,12 @@ class Inverse:
 
     def __post_init__(self) -> None:
         if not isinstance(getattr(self.stage, "_core", None), _core.Stage):
-            raise ParameterError(
-                f"stage is {quoted(self.stage)}: expected a stage, as a pt.DahlStage"
-            )
+            raise ParameterError("stage", quoted(self.stage), "a stage, as a pt.DahlStage")
         finite("offset", self.offset, "m")
         not_negative("delay", self.delay, "s")
         one_of("playback", self.playback, ("table", "online"))
         if not 1 <= _core.as_count("settle", self.settle) <= 1000:
-            raise ParameterError(f"settle is {self.settle}: expected 1 period or more, up to 1000")
+            raise ParameterError("settle", self.settle, "1 period or more, up to 1000")
         # The core refuses a stage without an inverse, and a state of another model.
         self._begun(1.0)
 
@@ -222,19 +220,23 @@ class Inverse:
         """
         _check(reference)
         if reference.period is None:
-            raise ParameterError(f"reference ({reference.name}) does not repeat: it has no table")
+            raise ParameterError(f"reference ({reference.name})", "one motion", "one that repeats")
         turn = reference.period / check_dt(dt)
         if not (turn > 0.5 and abs(turn - np.round(turn)) <= 1e-6):
             raise ParameterError(
-                f"dt is {dt:g} s: expected a whole number of samples in the period, "
-                f"{reference.period:g} s; online playback takes any period"
+                "dt",
+                f"{dt:g} s",
+                f"a whole number of samples in the period, {reference.period:g} s; online "
+                "playback takes any period",
             )
         count = round(turn)
         length = (self._settled(reference, reference.period) + 1) * reference.period
         if not _continues(reference) and length > reference.duration + 1e-3 * dt:
             raise ParameterError(
-                f"reference ({reference.name}) lasts {reference.duration:g} s: expected "
-                f"{length:g} s, until a period has settled"
+                f"reference ({reference.name})",
+                f"{reference.duration:g} s",
+                f"{length:g} s, until a period has settled",
+                verb="lasts",
             )
         return self.voltage(replace(reference, duration=length), dt, limits=limits)[-count:]
 
@@ -284,8 +286,10 @@ class Inverse:
         turns = reference.ramp / period
         if not turns <= MOST_TURNS:
             raise ParameterError(
-                f"reference ({reference.name}) repeats after {period:g} s: expected {MOST_TURNS} "
-                f"periods at most in its smooth start, {reference.ramp:g} s"
+                f"reference ({reference.name})",
+                f"after {period:g} s",
+                f"{MOST_TURNS} periods at most in its smooth start, {reference.ramp:g} s",
+                verb="repeats",
             )
         return max(self.settle, math.ceil(turns - 1e-9))
 

@@ -45,9 +45,7 @@ def model_named(name: object) -> ModelInfo:
             return model
     expected = ", ".join(repr(model.name) for model in MODELS)
     hint = "" if (near := _meant(name)) is None else f". Did you mean {near!r}?"
-    raise ParameterError(
-        f"model is {quoted(name)}: expected one of {expected}{hint}", argument="model"
-    )
+    raise ParameterError("model", quoted(name), f"one of {expected}{hint}")
 
 
 def _meant(name: object) -> str | None:
@@ -104,4 +102,4 @@ def model_of(stage: object, argument: str = "model") -> ModelInfo:
     """
     if isinstance(stage, Stage):
         return stage.info
-    raise ParameterError(f"{argument} is {quoted(stage)}: expected a stage, as a pt.DahlStage")
+    raise ParameterError(argument, quoted(stage), "a stage, as a pt.DahlStage")

@@ -218,8 +218,9 @@ class VirtualStage:
         if not isinstance(stage, Stage):
             if not (isinstance(stage, _Identified) and isinstance(stage.model, Stage)):
                 raise ParameterError(
-                    f"stage is {type(stage).__name__}: expected an identified model, or a stage of "
-                    "a model, as a pt.DahlStage"
+                    "stage",
+                    type(stage).__name__,
+                    "an identified model, or a stage of a model, as a pt.DahlStage",
                 )
             model, offset, own = stage.model, stage.offset, stage.delay
         assert isinstance(model, Stage)
@@ -334,8 +335,9 @@ def _creeping(stage: Stage, creep: Mapping[float, float]) -> Stage:
     """Give a stage other creep."""
     if not hasattr(creep, "items"):
         raise ParameterError(
-            f"creep is {quoted(creep)}: expected the share of each time constant in s, as "
-            "{0.1: 0.004, 1.0: 0.004}"
+            "creep",
+            quoted(creep),
+            "the share of each time constant in s, as {0.1: 0.004, 1.0: 0.004}",
         )
     changes: dict[str, Any] = {
         "creep_times": tuple(creep.keys()),
@@ -348,7 +350,7 @@ def _ringing(stage: Stage, mode: tuple[float, float]) -> Stage:
     """Give a stage one mode of a frequency [Hz] and a damping ratio."""
     given = one_or_more_numbers("mode", mode)
     if len(given) != 2:
-        raise ParameterError(f"mode is {given}: expected (frequency in Hz, damping ratio)")
+        raise ParameterError("mode", given, "(frequency in Hz, damping ratio)")
     frequency, damping_ratio = given
     names = stage.parameter_names()
     changes: dict[str, Any]
@@ -364,7 +366,7 @@ def _ringing(stage: Stage, mode: tuple[float, float]) -> Stage:
             "damping": 2.0 * damping_ratio * stiffness / natural,
         }
     else:
-        raise ParameterError(f"mode: a stage of {stage.info.title} has no linear dynamics")
+        raise ParameterError("mode", "given", f"none, as {stage.info.title} has no linear dynamics")
     return _with(stage, changes)
 
 

@@ -219,8 +219,9 @@ def _virtual(name: str, stage: object) -> VirtualStage:
         return VirtualStage.of(stage)  # type: ignore[arg-type]
     except ParameterError:
         raise ParameterError(
-            f"{name} is {type(stage).__name__}: expected an identified model, a stage of a model, "
-            "as a pt.DahlStage, or a pt.VirtualStage"
+            name,
+            type(stage).__name__,
+            "an identified model, a stage of a model, as a pt.DahlStage, or a pt.VirtualStage",
         ) from None
 
 
@@ -235,14 +236,14 @@ def _shares(cross_talk: Sequence[float] | ArrayLike) -> tuple[float, float]:
         rows = square_matrix("cross_talk", cross_talk)
         if (np.diag(rows) != 1.0).any():
             raise ParameterError(
-                f"cross_talk has {rows[0, 0]:g} and {rows[1, 1]:g} on its diagonal: expected 1, as "
-                "the gains are the stages' own"
+                "cross_talk",
+                f"{rows[0, 0]:g} and {rows[1, 1]:g} on its diagonal",
+                "1, as the gains are the stages' own",
+                verb="has",
             )
         return float(rows[0, 1]), float(rows[1, 0])
     listed = list(cross_talk) if dimensions == 1 else []  # type: ignore[arg-type]
     if len(listed) != 2:
-        raise ParameterError(
-            f"cross_talk is {quoted(cross_talk)}: expected two numbers, or a matrix of 2 by 2"
-        )
+        raise ParameterError("cross_talk", quoted(cross_talk), "two numbers, or a matrix of 2 by 2")
     xy, yx = (_core.as_number(f"cross_talk[{i}]", one) for i, one in enumerate(listed))
     return xy, yx

@@ -128,7 +128,7 @@ class Apparatus:
             return cls(stage=stage, delay=document["delay"], jitter=document["jitter"]).seeded(0)
         except (KeyError, TypeError, IndexError):
             raise ParameterError(
-                f"document is {quoted(document)}: expected what Apparatus.document returns"
+                "document", quoted(document), "what Apparatus.document returns"
             ) from None
 
     @classmethod

@@ -214,11 +214,11 @@ def reproduce(
     """
     count = _core.as_count("seeds", seeds)
     if not 1 <= count <= 1000:
-        raise ParameterError(f"seeds is {count}: expected 1 to 1000")
+        raise ParameterError("seeds", count, "1 to 1000")
     apparatus = Apparatus.calibrated() if apparatus is None else apparatus
     if not isinstance(apparatus, Apparatus):
         kind = type(apparatus).__name__
-        raise ParameterError(f"apparatus is {kind}: expected a pt.xu_li_2010.Apparatus")
+        raise ParameterError("apparatus", kind, "a pt.xu_li_2010.Apparatus")
     chosen = tuple(range(FIRST_SEED, FIRST_SEED + count))
     # A missing file is reported before the computation.
     log = None if dbo is None else drives(dbo)

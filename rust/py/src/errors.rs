@@ -15,19 +15,16 @@ mod classes {
 pub fn raise(error: &Error) -> PyErr {
     let message = error.to_string();
     match error {
-        Error::Parameter { name, .. } => of_argument(name, message),
-        Error::Shape { .. } => classes::ShapeError::new_err(message),
+        Error::Parameter { name, value, expected } => {
+            classes::ParameterError::new_err((name.clone(), value.clone(), expected.clone()))
+        }
+        Error::Shape { name, found, expected } => {
+            classes::ShapeError::new_err((name.clone(), found.clone(), expected.clone()))
+        }
         Error::Data(_) => classes::DataError::new_err(message),
         Error::Numerical(_) => classes::NumericalError::new_err(message),
         Error::Memory { .. } => PyMemoryError::new_err(message),
     }
-}
-
-/// The exception for an argument, which it names.
-fn of_argument(name: &str, message: String) -> PyErr {
-    let error = classes::ParameterError::new_err(message);
-    let named = Python::attach(|py| error.value(py).setattr("argument", name));
-    named.err().unwrap_or(error)
 }
 
 /// The exception for an array of the wrong shape.

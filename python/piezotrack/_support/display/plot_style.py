@@ -158,7 +158,7 @@ def axes_or_new(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
     axes = [ax for ax in several if isinstance(ax, Axes)]
     if len(axes) != count:
         name, words = ("ax", "the axes") if count == 1 else ("axes", f"{count} axes")
-        raise ParameterError(f"{name} is {quoted(given)}: expected {words} of Matplotlib")
+        raise ParameterError(name, quoted(given), f"{words} of Matplotlib")
     return axes
 
 

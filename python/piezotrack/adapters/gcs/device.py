@@ -99,7 +99,7 @@ class GcsDevice:
         timeout: float = TIMEOUT,
     ) -> None:
         if not (isinstance(axis, str) and axis.isdecimal() and axis.isascii()):
-            raise ParameterError(f"axis is {quoted(axis)}: expected a number, as '1'")
+            raise ParameterError("axis", quoted(axis), "a number, as '1'")
         self._axis, self._factor = axis, positive("factor", factor, "V")
         self._open = True
         # The number of the connection on which the servo was switched off.
@@ -423,8 +423,10 @@ class GcsDevice:
         """Return the limits of the output [V]."""
         if not {"VMI?", "VMA?"} <= self._known:
             raise ParameterError(
-                f"limits are not given, and {self._line.name} does not say them: expected (low, "
-                "high) in V, in an address ?limits=0..100V"
+                "limits",
+                f"not given, and {self._line.name} does not say them",
+                "(low, high) in V, in an address ?limits=0..100V",
+                verb="are",
             )
         low, high = self._value("VMI?"), self._value("VMA?")
         if not low < high:
@@ -480,7 +482,7 @@ def from_address(
 ) -> GcsDevice:
     """Connect to the controller of an address: ``gcs://HOST[:PORT][/AXIS][?limits=0..100V]``."""
     if not host:
-        raise ParameterError("device has no host: expected gcs://HOST[:PORT][/AXIS]")
+        raise ParameterError("device", "no host", "gcs://HOST[:PORT][/AXIS]", verb="has")
     given = Options(FORM, options)
     limits = given.span("limits", "voltage") if "limits" in options else None
     factor = given.value("factor", "voltage", 1.0)

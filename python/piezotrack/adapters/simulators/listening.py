@@ -21,7 +21,7 @@ def checked_port(port: int) -> int:
     """
     port = _core.as_count("port", port)
     if port > 65535:
-        raise ParameterError(f"port is {port}: expected 0 to 65535")
+        raise ParameterError("port", port, "0 to 65535")
     return port
 
 
@@ -30,10 +30,10 @@ def cannot_listen(host: str, port: int, error: OSError) -> ParameterError:
 
     Examples
     --------
-    >>> cannot_listen("nowhere", 5025, OSError("Name or service not known"))
-    ParameterError("host is 'nowhere': it cannot be listened at: name or service not known")
+    >>> print(cannot_listen("::2", 5025, OSError("No such host")))
+    host is '::2': expected an address that can be listened at: no such host
     """
     taken = error.errno in (errno.EADDRINUSE, errno.EACCES)
-    name = f"port is {port}" if taken else f"host is {quoted(host)}"
+    name, value = ("port", port) if taken else ("host", quoted(host))
     reason = (error.strerror or str(error)).lower()
-    return ParameterError(f"{name}: it cannot be listened at: {reason}")
+    return ParameterError(name, value, f"an address that can be listened at: {reason}")

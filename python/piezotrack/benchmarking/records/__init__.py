@@ -50,12 +50,14 @@ def records_named(records: Iterable[str | BenchmarkRecord] | None) -> list[Bench
             record = RECORDS[one]()
         else:
             raise ParameterError(
-                f"records has {quoted(one)}: expected some of "
-                f"{', '.join(map(repr, RECORDS))}, or a pt.BenchmarkRecord"
+                "records",
+                quoted(one),
+                f"some of {', '.join(map(repr, RECORDS))}, or a pt.BenchmarkRecord",
+                verb="has",
             )
         if record.name in found:
-            raise ParameterError(f"records has {record.name} twice: expected each name once")
+            raise ParameterError("records", f"{record.name} twice", "each name once", verb="has")
         found[record.name] = record
     if not found:
-        raise ParameterError("records is empty: expected one or more")
+        raise ParameterError("records", "empty", "one or more")
     return list(found.values())

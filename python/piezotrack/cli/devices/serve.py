@@ -98,7 +98,7 @@ def serve_command(
         refuse_without_effect(context, ("model", "limits", "speed"), "with --device")
     if protocol == "epics":
         if prefix is None:
-            raise ParameterError("--prefix is missing: expected the start of names, as LAB:STAGE")
+            raise ParameterError("--prefix", "missing", "the start of names, as LAB:STAGE")
         with _published(device, model, limits, speed) as one:
             _epics(one, prefix)
         return
@@ -118,8 +118,9 @@ def _stage(model: Path | None, limits: str | None) -> tuple[VirtualStage, Limits
     within = known if limits is None else number_range("--limits", limits)
     if within is None and not all(map(math.isfinite, stage.amplifier.limits)):
         raise ParameterError(
-            f"--limits is not given, and {model} does not say with which voltages it was "
-            "identified: expected --limits LOW:HIGH"
+            "--limits",
+            f"not given, and {model} does not say with which voltages it was identified",
+            "--limits LOW:HIGH",
         )
     return stage, within
 

@@ -107,9 +107,7 @@ def _rates(text: str) -> tuple[float, float, float]:
     try:
         slow, medium, fast = (float(one) for one in text.split(","))
     except ValueError:
-        raise ParameterError(
-            f"--rates is {text!r}: expected three rates in Hz, as 1,5,20"
-        ) from None
+        raise ParameterError("--rates", f"{text!r}", "three rates in Hz, as 1,5,20") from None
     if not 0.0 < slow < medium < fast < math.inf:
-        raise ParameterError(f"--rates is {text!r}: expected three rates in Hz in rising order")
+        raise ParameterError("--rates", f"{text!r}", "three rates in Hz in rising order")
     return slow, medium, fast

@@ -182,7 +182,7 @@ def _gains(kp: str | None) -> tuple[float | None, float | None]:
         return None, None
     parts = [number("--kp", part) for part in kp.split(",")]
     if len(parts) > 2:
-        raise ParameterError(f"--kp is '{kp}': expected one gain, or KX,KY")
+        raise ParameterError("--kp", f"'{kp}'", "one gain, or KX,KY")
     return parts[0], parts[-1]
 
 
@@ -191,7 +191,7 @@ def _is_own(stage: str | None, models: list[Path] | None, table_2: bool) -> bool
     check_stage(stage)
     if stage == MODEL and (not models or table_2):
         reason = "with --table-2" if table_2 else "without a model file"
-        raise ParameterError(f"--stage is {MODEL} {reason}: expected {PAPER}")
+        raise ParameterError("--stage", f"{MODEL} {reason}", PAPER)
     return bool(models) and stage != PAPER and not table_2
 
 
@@ -216,8 +216,7 @@ def _check(
         refuse_without_effect(context, ["decouple"], "with --no-feedforward")
         if models and not own:
             raise ParameterError(
-                f"MODEL_X is {models[0]}: expected none with --no-feedforward, where it has no "
-                "effect"
+                "MODEL_X", models[0], "none with --no-feedforward, where it has no effect"
             )
 
 
@@ -242,7 +241,7 @@ def _path(
             raise DataError(words.replace("interval with dt=", "interval with --path-dt")) from None
     for option, value in (("--period", period), ("--path-dt", dt)):
         if value is not None:
-            raise ParameterError(f"{option} is for a path from a file: expected none with {text}")
+            raise ParameterError(option, "for a path from a file", f"none with {text}")
     return parse_path(text, duration=duration, **place)
 
 

@@ -90,9 +90,9 @@ def export_command(
     except ParameterError as error:
         if name is not None:
             raise
-        raise ParameterError(f"{error}; --name gives one") from None
+        raise ParameterError(f"{error}; --name gives one", argument="--name") from None
     if single and to in ("json", "library"):
-        raise ParameterError(f"--float has no effect with --to {to}: expected it left out")
+        raise ParameterError("--float", f"no effect with --to {to}", "it left out", verb="has")
     if reference is None:
         refuse_without_effect(context, ("duration", "period"), "without --reference")
     known = load_controller(controller)

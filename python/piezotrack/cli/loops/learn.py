@@ -194,9 +194,9 @@ def _check_options(
 
 def _check_file(out: Path) -> None:
     if out.suffix.lower() != ".csv":
-        raise ParameterError(f"--out is {out}: expected the name of a file, as table.csv")
+        raise ParameterError("--out", out, "the name of a file, as table.csv")
     if out.is_dir():
-        raise ParameterError(f"--out is {out}, a folder: expected the name of a file in it")
+        raise ParameterError("--out", f"{out}, a folder", "the name of a file in it")
 
 
 def _within(

@@ -145,7 +145,7 @@ def noise_metres(noise_nm: float) -> float:
         If it is negative or not finite: in nm, as it was typed.
     """
     if not (isfinite(noise_nm) and noise_nm >= 0.0):
-        raise ParameterError(f"--noise-nm is {noise_nm:g}: expected nm rms, finite, 0 or above")
+        raise ParameterError("--noise-nm", f"{noise_nm:g}", "nm rms, finite, 0 or above")
     return 1e-9 * noise_nm
 
 
@@ -201,8 +201,9 @@ class Loop:
         if self.kp is None or self.ti is None:
             missing = "--kp" if self.kp is None else "--ti"
             raise ParameterError(
-                f"{missing} is missing: expected --kp in V/um and --ti in s for feedback on this "
-                "stage, or --no-feedback"
+                missing,
+                "missing",
+                "--kp in V/um and --ti in s for feedback on this stage, or --no-feedback",
             )
         return Pid(kp=self.kp * _per_um(model), ti=self.ti, td=self.td or 0.0, tt=self.tt)
 
@@ -272,9 +273,7 @@ def _per_um(model: IdentifiedModel | None) -> float:
 
 
 def _missing(option: str, expected: str) -> ParameterError:
-    return ParameterError(
-        f"{option} is missing, and the model file has no record: expected {expected}"
-    )
+    return ParameterError(option, "missing, and the model file has no record", expected)
 
 
 # Margins below which a loop is called sensitive.
@@ -318,7 +317,7 @@ def simulated(
     if other.drive_unit != known.drive_unit:
         one, two = (shown_unit(model.drive_unit)[0] for model in (other, known))
         raise ParameterError(
-            f"--stage is {stage}, whose drive is in {one}: expected one in {two}, as of the model"
+            "--stage", f"{stage}, whose drive is in {one}", f"one in {two}, as of the model"
         )
     return VirtualStage.of(other, noise=noise, bandwidth=bandwidth, seed=seed)
 
@@ -326,7 +325,7 @@ def simulated(
 def check_stage(stage: str | None) -> None:
     """Refuse a stage of another name."""
     if stage not in (None, MODEL, PAPER):
-        raise ParameterError(f"--stage is '{stage}': expected {MODEL} or {PAPER}")
+        raise ParameterError("--stage", f"'{stage}'", f"{MODEL} or {PAPER}")
 
 
 def refuse_of_other_stage(context: typer.Context, own: bool) -> None:

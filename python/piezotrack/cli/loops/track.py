@@ -343,5 +343,5 @@ def parsed_reference(text: str, duration: float | None, period: float | None) ->
     if Path(text).is_file():
         return read_reference(text, duration=duration, period=period)
     if period is not None:
-        raise ParameterError(f"--period is for a reference from a file: expected none with {text}")
+        raise ParameterError("--period", "for a reference from a file", f"none with {text}")
     return parse_reference(text, duration=duration)

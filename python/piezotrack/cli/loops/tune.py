@@ -130,16 +130,16 @@ def _within(option: str, value: float, low: float, high: float, expected: str) -
     0 is in its range, 1 is not.
     """
     if not (low < value < high or value == low == 0.0):
-        raise ParameterError(f"{option} is {value:g}: expected {expected}")
+        raise ParameterError(option, f"{value:g}", expected)
 
 
 def _figure(figure: str, allowed: float | None) -> Any:
     if figure not in ("rms", "largest", "effort"):
-        raise ParameterError(f"--figure is {figure}: expected rms, largest or effort")
+        raise ParameterError("--figure", figure, "rms, largest or effort")
     if figure == "effort" and allowed is None:
         raise ParameterError(
-            "--figure is effort without --allowed-um: expected the largest rms error in um"
+            "--figure", "effort without --allowed-um", "the largest rms error in um"
         )
     if allowed is not None and not allowed > 0.0:
-        raise ParameterError(f"--allowed-um is {allowed:g}: expected an error above 0 um")
+        raise ParameterError("--allowed-um", f"{allowed:g}", "an error above 0 um")
     return figure

@@ -90,8 +90,7 @@ class PaperStage:
     def __init__(self, models: list[Path] | None, loop: Loop, seed: int) -> None:
         if models and len(models) > 1:
             raise ParameterError(
-                f"MODEL_Y is {models[1]}: expected one model file with --stage {PAPER}, for both "
-                "axes"
+                "MODEL_Y", models[1], f"one model file with --stage {PAPER}, for both axes"
             )
         self._file = models[0] if models else None
         self._loop, self._seed = loop, seed

@@ -196,7 +196,7 @@ def _titles(files: list[Path]) -> dict[str, Path]:
     titles = names if len(set(names)) == len(names) else [str(file) for file in files]
     for i, title in enumerate(titles):
         if title in titles[:i]:
-            raise ParameterError(f"{title} is given twice: expected it once")
+            raise ParameterError(title, "given twice", "it once")
     return dict(zip(titles, files, strict=True))
 
 
@@ -208,7 +208,7 @@ def _seeds(text: str) -> range:
     except ValueError:
         found = range(0)
     if not found or found.start < 0:
-        raise ParameterError(f"--seeds is '{text}': expected a number, as 10, or A:B, as 10:20")
+        raise ParameterError("--seeds", f"'{text}'", "a number, as 10, or A:B, as 10:20")
     return found
 
 
@@ -223,7 +223,7 @@ def _executor(workers: int | None, dask: str | None) -> Iterator[Executor | None
     if workers is not None and dask is not None:
         raise ParameterError("--workers and --dask: expected one of them at most, both are given")
     if workers is not None and not 1 <= workers <= 256:
-        raise ParameterError(f"--workers is {workers}: expected 1 to 256")
+        raise ParameterError("--workers", workers, "1 to 256")
     if dask is not None:
         with _cluster(dask) as client:
             yield client.get_executor()

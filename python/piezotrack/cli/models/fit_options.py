@@ -264,7 +264,7 @@ class Kinds:
             if name != AUTO:
                 model_named(name)
             if name in names[:i]:
-                raise ParameterError(f"--model names {name} twice: expected it once")
+                raise ParameterError("--model", f"{name} twice", "it once", verb="names")
         return cls(names)
 
     def refuse_without_effect(self, context: typer.Context) -> None:
@@ -367,17 +367,16 @@ class FitOptions:
             said = given.setdefault("stiffness", {})
             if "value" in said and said["value"] != self.stiffness:
                 raise ParameterError(
-                    f"--stiffness is {self.stiffness:g}: expected the value given for it by --fix, "
-                    "or only one of the two"
+                    "--stiffness",
+                    f"{self.stiffness:g}",
+                    "the value given for it by --fix, or only one of the two",
                 )
             said["value"] = self.stiffness
         for name in self._free:
             if "value" in given.setdefault(name, {}):
-                raise ParameterError(
-                    f"--free is {name}: expected a parameter that is not fixed as well"
-                )
+                raise ParameterError("--free", name, "a parameter that is not fixed as well")
             if "tie" in given[name]:
-                raise ParameterError(f"--free is {name}: expected a parameter that is not tied")
+                raise ParameterError("--free", name, "a parameter that is not tied")
         return {name: Parameter(**said) for name, said in given.items()}
 
     @property
@@ -390,7 +389,7 @@ class FitOptions:
         names = [one.name for one in infos]
         for name in self._free:
             if name not in names:
-                raise ParameterError(f"--free is '{name}': expected one of {', '.join(names)}")
+                raise ParameterError("--free", f"'{name}'", f"one of {', '.join(names)}")
         for one in infos:
             said = parameters.get(one.name)
             has_value = said is not None and (said.value is not None or said.tie is not None)
@@ -398,8 +397,9 @@ class FitOptions:
             nominal = one.name == "stiffness" and one.carries_force
             if not (one.name in self._free or has_value or nominal or one.default is not None):
                 raise ParameterError(
-                    f"--free is {', '.join(self._free)}: expected {one.name} as well, or a value "
-                    "for it by --fix"
+                    "--free",
+                    ", ".join(self._free),
+                    f"{one.name} as well, or a value for it by --fix",
                 )
 
     def _methods(self, kind: str) -> list[OneMethod] | None:
@@ -415,7 +415,7 @@ class FitOptions:
 
         swarm = self._swarm
         if self.method == "descents" and swarm is not None:
-            raise ParameterError("--swarm is given with --method descents: expected one of them")
+            raise ParameterError("--swarm", "given with --method descents", "one of them")
         running = {"seed": self.seed, "runs": self.runs}
         given: dict[str, Any] = {
             name: value for name, value in running.items() if value is not None
@@ -457,14 +457,14 @@ def _swarm_named(name: str) -> ParticleSwarm:
         "spso-2011": ParticleSwarm.spso_2011(),
     }
     if name not in known:
-        raise ParameterError(f"--swarm is '{name}': expected {', '.join(known)}")
+        raise ParameterError("--swarm", f"'{name}'", ", ".join(known))
     return known[name]
 
 
 def _prior(option: str, text: str) -> tuple[float, float]:
     value, colon, width = text.partition(":")
     if not colon:
-        raise ParameterError(f"{option} has '{text}': expected VALUE:WIDTH")
+        raise ParameterError(option, f"'{text}'", "VALUE:WIDTH", verb="has")
     return number(option, value), number(option, width)
 
 
@@ -533,7 +533,7 @@ def check_each_log(
     ):
         check_count(option, given, count)
     if weight and count == 1:
-        raise ParameterError("--weight has no effect with 1 log: expected it left out")
+        raise ParameterError("--weight", "no effect with 1 log", "it left out", verb="has")
     for text in delay or []:
         delay_asked(text)
     for text in drift or []:
@@ -553,7 +553,7 @@ def check_count(option: str, given: Sequence[object] | None, count: int) -> None
     if given is not None and len(given) not in (1, count):
         logs = "1 log" if count == 1 else f"{count} logs"
         raise ParameterError(
-            f"{option} is given {len(given)} times with {logs}: expected once, or once for each"
+            option, f"given {len(given)} times with {logs}", "once, or once for each"
         )
 
 

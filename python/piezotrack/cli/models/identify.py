@@ -158,7 +158,7 @@ def identify_command(
     kinds.refuse_of_others(context)
     check_each_log(len(files), delay=delay, drift=drift, history=history, weight=weight)
     if checkpoint is not None and len(kinds.names) > 1:
-        raise ParameterError("--checkpoint is given with several models: expected one")
+        raise ParameterError("--checkpoint", "given with several models", "one")
     columns = Columns(time, drive, displacement, unit, dt)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")

@@ -84,5 +84,5 @@ def step_command(
 def _level(text: str) -> tuple[float, float]:
     voltage, colon, um = text.partition(":")
     if not colon:
-        raise ParameterError(f"--second-level is '{text}': expected V:UM, as 37.5:60.2")
+        raise ParameterError("--second-level", f"'{text}'", "V:UM, as 37.5:60.2")
     return number("--second-level", voltage), number("--second-level", um) / 1e6

@@ -8,7 +8,7 @@ from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
-from ..._support.arguments import given_or, number_pair, one_of
+from ..._support.arguments import expect, given_or, number_pair, one_of
 from ..._support.arrays import check_dt
 from ...errors import ParameterError, PiezotrackError
 from ...identification.fitted.identified_model import IdentifiedModel
@@ -127,10 +127,7 @@ def compare_controllers(
     """
     plant = plant_of(stage)
     low, high = number_pair("limits", limits, "V")
-    if not isinstance(model, (Stage, IdentifiedModel)):
-        raise ParameterError(
-            f"model is {type(model).__name__}: expected a stage or identified model"
-        )
+    expect("model", model, (Stage, IdentifiedModel), "a stage or identified model")
     interval = check_dt(dt)
     timing = timing_on(plant, timing, (low, high))
     check_delay(plant, timing.delay, interval)
@@ -156,7 +153,8 @@ def compare_controllers(
             refused[name] = str(error)
     if not rows:
         name, words = next(iter(refused.items()))
-        raise ParameterError(f"controllers: not one could be made; {name}: {words}")
+        words = f"controllers: not one could be made; {name}: {words}"
+        raise ParameterError(words, argument="controllers")
     return ControllerComparison(
         rows=tuple(rows),
         references=tuple(one.name for one in task.references),
@@ -170,7 +168,7 @@ def compare_controllers(
 
 def _counted(seeds: int) -> int:
     if not 1 <= _core.as_count("seeds", seeds) <= 100:
-        raise ParameterError(f"seeds is {seeds}: expected 1 to 100")
+        raise ParameterError("seeds", seeds, "1 to 100")
     return seeds
 
 
@@ -178,9 +176,9 @@ def _references(given: Sequence[Reference] | None) -> list[Reference]:
     listed = [] if given is None else list(given)
     for one in listed:
         if not isinstance(one, Reference):
-            raise ParameterError(f"references has {type(one).__name__}: expected pt.Reference")
+            raise ParameterError("references", type(one).__name__, "pt.Reference", verb="has")
     if given is not None and not listed:
-        raise ParameterError("references is empty: expected one or more")
+        raise ParameterError("references", "empty", "one or more")
     return listed
 
 
@@ -189,7 +187,7 @@ def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
         for i, one in enumerate(controllers):
             one_of(f"controllers[{i}]", one, CONTENDERS)
         if not controllers:
-            raise ParameterError("controllers is empty: expected one or more")
+            raise ParameterError("controllers", "empty", "one or more")
         return list(controllers)
     missing = set()
     if task.record is None:
@@ -208,7 +206,8 @@ def _row(name: str, entries: list[Entry | None], task: Task, draws: int) -> Row:
     """Judge a controller by all references, on all variants of the stage."""
     first = next((entry for entry in entries if entry is not None), None)
     if first is None:
-        raise ParameterError("references: expected one at least that it can learn, which repeats")
+        words = "references: expected one at least that it can learn, which repeats"
+        raise ParameterError(words, argument="references")
     cells = [
         tuple(_cell(entry, variant, task, draws, chatters=i == 0) for entry in entries)
         for i, variant in enumerate(variants(task.stage))

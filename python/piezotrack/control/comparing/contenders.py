@@ -144,7 +144,7 @@ def _other(name: str) -> Maker:
 
 def _network(task: Task) -> list[Entry | None]:
     if task.record is None:
-        raise ParameterError("record is missing: expected one to train the network with")
+        raise ParameterError("record", "missing", "one to train the network with")
     return task.each(task.alone(train_network(task.record)))
 
 
@@ -164,7 +164,7 @@ def _observed(task: Task) -> list[Entry | None]:
     model = task.models["dahl"]
     stage = model if isinstance(model, DahlStage) else getattr(model, "model", None)
     if not isinstance(stage, DahlStage):
-        raise ParameterError("models['dahl'] is no Dahl stage: expected one to observe")
+        raise ParameterError("models['dahl']", "no Dahl stage", "one to observe")
     tuned = task.tuned(inverse=None)
     tuned_pid: Any = tuned.feedback
     plants = plants_of([task.stage], task.limits, task.timing.delay, task.spread)
@@ -175,7 +175,8 @@ def _observed(task: Task) -> list[Entry | None]:
             return task.each(controller)
     raise ParameterError(
         "margins: expected some that a PID around the observer keeps, of which its gains of 1 to "
-        f"{SHARES[-1]:g} times those of the PID alone do not"
+        f"{SHARES[-1]:g} times those of the PID alone do not",
+        argument="margins",
     )
 
 
@@ -263,7 +264,8 @@ def _h_infinity(task: Task) -> list[Entry | None]:
         if all(_keeps(controller, one.plant, task.margins) for one in plants):
             best = controller
     if best is None:
-        raise ParameterError(f"margins: expected some that a law by H-infinity keeps; {why}")
+        words = f"margins: expected some that a law by H-infinity keeps; {why}"
+        raise ParameterError(words, argument="margins")
     return task.each(best)
 
 

@@ -109,17 +109,22 @@ def _checked(rates: tuple[float, float, float], dt: float) -> tuple[float, float
     """Check that rates rise, and what they ask of samples every `dt` seconds."""
     listed = as_numbers("rates", rates)
     if len(listed) != 3 or not 0.0 < listed[0] < listed[1] < listed[2]:
-        raise ParameterError(f"rates is {listed}: expected three rates in Hz in rising order")
+        raise ParameterError("rates", listed, "three rates in Hz in rising order")
     slow, medium, fast = listed
     if not fast < 0.5 / dt:
         raise ParameterError(
-            f"rates ends with {fast:g} Hz: expected one below half the sampling rate, "
-            f"{0.5 / dt:.6g} Hz"
+            "rates",
+            f"{fast:g} Hz",
+            f"one below half the sampling rate, {0.5 / dt:.6g} Hz",
+            verb="ends with",
         )
     if PERIODS / slow / dt > MOST_SAMPLES:
         least = PERIODS / MOST_SAMPLES / dt
         raise ParameterError(
-            f"rates begins with {slow:g} Hz: expected {least:.3g} Hz or more, "
-            f"of which {PERIODS} periods are {MOST_SAMPLES:g} samples of {dt:g} s"
+            "rates",
+            f"{slow:g} Hz",
+            f"{least:.3g} Hz or more, of which {PERIODS} periods are {MOST_SAMPLES:g} samples "
+            f"of {dt:g} s",
+            verb="begins with",
         )
     return slow, medium, fast

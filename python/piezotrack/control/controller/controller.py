@@ -318,12 +318,9 @@ class Controller:
         """Margins at design: of a report, or else of the file that this was read from."""
         if report is None:
             return None if self.provenance is None else self.provenance.get("design")
-        if not isinstance(report, DesignReport):
-            raise ParameterError(
-                f"report is {type(report).__name__}: expected what pt.check_loop or pt.tune returns"
-            )
+        expect("report", report, DesignReport, "what pt.check_loop or pt.tune returns")
         if self not in report.controllers:
-            raise ParameterError("report is of another controller: expected that of this one")
+            raise ParameterError("report", "of another controller", "that of this one")
         return report.design()
 
     def save(self, path: str | os.PathLike[str], *, report: DesignReport | None = None) -> Path:
@@ -372,7 +369,7 @@ def _of_record(name: str, given: T | None, known: T | None) -> T:
     if given is not None:
         return given
     if known is None:
-        raise ParameterError(f"{name} is not in the file of this model: expected {name}=")
+        raise ParameterError(name, "not in the file of this model", f"{name}=")
     return known
 
 
@@ -384,13 +381,15 @@ def _check_unit(name: str, gain: float, span: float, owner: str, unit: str) -> N
     """Refuse a gain that no nanopositioner can have: full span for 10 nm, or a trace for 1 mm."""
     if abs(gain) * 1e-8 > span:
         raise ParameterError(
-            f"{name} is {gain:g} {unit}/m: expected a gain with which 10 nm of error asks for less "
-            f"than the whole range of {span:g} {unit}; {1e-6 * gain:g} {unit}/m is "
-            f"{1e-12 * gain:g} {unit}/um"
+            name,
+            f"{gain:g} {unit}/m",
+            f"a gain with which 10 nm of error asks for less than the whole range of {span:g} "
+            f"{unit}; {1e-6 * gain:g} {unit}/m is {1e-12 * gain:g} {unit}/um",
         )
     if 0.0 < abs(gain) * 1e-3 < 1e-3 * span:
         raise ParameterError(
-            f"{name} is {gain:g} {unit}/m: expected a gain with which 1 mm of error asks for more "
-            f"than a thousandth of the range; if it is in {unit}/um, write "
-            f"pt.{owner}.from_um({name}={gain:g}, ...)"
+            name,
+            f"{gain:g} {unit}/m",
+            "a gain with which 1 mm of error asks for more than a thousandth of the range; if "
+            f"it is in {unit}/um, write pt.{owner}.from_um({name}={gain:g}, ...)",
         )

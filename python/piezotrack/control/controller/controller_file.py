@@ -48,8 +48,9 @@ def inverse_entry(inverse: Inverse | None, drive: str) -> dict[str, Any] | None:
         return entry | {"kind": "network", "numbers": numbers} | errors
     if type(inverse) is not Inverse:
         raise ParameterError(
-            f"feedforward is {type(inverse).__name__}: expected pt.Inverse or "
-            "pt.control.NetworkInverse, which a file can hold"
+            "feedforward",
+            type(inverse).__name__,
+            "pt.Inverse or pt.control.NetworkInverse, which a file can hold",
         )
     return entry
 
@@ -63,7 +64,7 @@ def inverse_of(entry: Any, drive: str) -> Inverse | None:
     network = found.get("kind") == "network"
     if not network and found.get("kind") != "inverse":
         kind = quoted(found.get("kind"))
-        raise ParameterError(f"feedforward: kind is {kind}: expected 'inverse' or 'network'")
+        raise ParameterError("feedforward: kind", kind, "'inverse' or 'network'")
     errors = [f"trained_{drive}", f"held_out_{drive}"]
     only("feedforward", found, [*keys, "numbers", *errors] if network else keys)
     stage = stage_of("feedforward: stage", found["stage"], drive)

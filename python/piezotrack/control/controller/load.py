@@ -68,7 +68,7 @@ def load_controller(path: str | os.PathLike[str]) -> Controller:
 def _controller_of(document: dict[str, Any]) -> Controller:
     drive = document.get("drive_unit")
     if drive not in DRIVE_UNITS:
-        raise ParameterError(f"drive_unit is {quoted(drive)}: expected 'V', 'm' or 'N'")
+        raise ParameterError("drive_unit", quoted(drive), "'V', 'm' or 'N'")
     own = ("dt_s", f"limits_{drive}", "span_m", "max_jump_m")
     parts = ("feedforward", "feedback", "repetitive", "filters")
     keys = ("format", "schema_version", "drive_unit", *own, *parts, "provenance")
@@ -76,7 +76,7 @@ def _controller_of(document: dict[str, Any]) -> Controller:
     dt, limits, span, jump = (document[key] for key in own)
     filters = document["filters"]
     if not isinstance(filters, list):
-        raise ParameterError(f"filters is {quoted(filters)}: expected a list of filters")
+        raise ParameterError("filters", quoted(filters), "a list of filters")
     return Controller(
         dt=_core.as_number("dt_s", dt),
         limits=_pair(own[1], limits),
@@ -95,7 +95,7 @@ def _controller_of(document: dict[str, Any]) -> Controller:
 
 def _pair(name: str, value: Any) -> tuple[float, float]:
     if not isinstance(value, list) or len(value) != 2:
-        raise ParameterError(f"{name} is {quoted(value)}: expected two numbers, the lower first")
+        raise ParameterError(name, quoted(value), "two numbers, the lower first")
     return _core.as_number(name, value[0]), _core.as_number(name, value[1])
 
 
@@ -106,7 +106,9 @@ def _provenance_of(document: dict[str, Any]) -> dict[str, Any]:
     expected = None if forward is None else digest(forward["stage"])
     if found["model_sha256"] not in (None, expected):
         raise ParameterError(
-            f"provenance: model_sha256 is {quoted(found['model_sha256'])}: expected {expected!r}, "
-            "that of the stage in the file, or null where the stage was changed on purpose"
+            "provenance: model_sha256",
+            quoted(found["model_sha256"]),
+            f"{expected!r}, that of the stage in the file, or null where the stage was changed "
+            "on purpose",
         )
     return found

@@ -191,14 +191,16 @@ class Session:
             and not low <= (place := _core.as_number("preview", preview)) <= high
         ):
             raise ParameterError(
-                f"preview is {place:g} m: expected {low:.4g} to {high:.4g} m, what the sensor of "
-                "this controller can show"
+                "preview",
+                f"{place:g} m",
+                f"{low:.4g} to {high:.4g} m, what the sensor of this controller can show",
             )
         fastest = (high - low) / self._controller.dt
         if velocity is not None and abs(speed := _core.as_number("velocity", velocity)) > fastest:
             raise ParameterError(
-                f"velocity is {speed:g} m/s: expected {fastest:.3g} m/s at most, the span of the "
-                "sensor in one sampling interval"
+                "velocity",
+                f"{speed:g} m/s",
+                f"{fastest:.3g} m/s at most, the span of the sensor in one sampling interval",
             )
         least, most = self._controller.limits
         far, unit = FAR * (most - least), self._controller.drive_unit
@@ -207,8 +209,9 @@ class Session:
             # One that is not finite is held back by the core.
             if math.isfinite(volts) and not least - far <= volts <= most + far:
                 raise ParameterError(
-                    f"feedforward is {volts:g} {unit}: expected one near the limits, {least:g} to "
-                    f"{most:g} {unit}"
+                    "feedforward",
+                    f"{volts:g} {unit}",
+                    f"one near the limits, {least:g} to {most:g} {unit}",
                 )
 
     def step_um(
@@ -315,17 +318,13 @@ class Session:
         ParameterError
             It differs in more than its gains.
         """
-        if not isinstance(controller, type(self._controller)):
-            raise ParameterError(
-                f"controller is {type(controller).__name__}: expected pt.Controller"
-            )
+        expect("controller", controller, type(self._controller), "pt.Controller")
         if not math.isclose(controller.dt, self._controller.dt, rel_tol=1e-12):
             raise ParameterError(
-                f"dt is {controller.dt:g} s: expected that of the session, "
-                f"{self._controller.dt:g} s"
+                "dt", f"{controller.dt:g} s", f"that of the session, {self._controller.dt:g} s"
             )
         if controller.feedforward != self._controller.feedforward:
-            raise ParameterError("feedforward is another: expected that of the session")
+            raise ParameterError("feedforward", "another", "that of the session")
         self._core.retune(controller._core)
         self._controller = controller
         if self._inverse is not None:

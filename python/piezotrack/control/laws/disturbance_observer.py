@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ... import _core
-from ..._support.arguments import finite, not_negative
+from ..._support.arguments import expect
 from ...errors import ParameterError
 from ..parts.part import FeedbackLaw, part
 from .pid import Pid
 
-__all__ = ["DisturbanceObserver", "check_nominal"]
+__all__ = ["DisturbanceObserver"]
 
 
 @part("disturbance-observer")
@@ -63,22 +62,13 @@ class DisturbanceObserver(FeedbackLaw):
     cutoff: float
 
     def __post_init__(self) -> None:
-        if not isinstance(self.pid, Pid):
-            raise ParameterError(f"pid is {type(self.pid).__name__}: expected pt.Pid")
+        expect("pid", self.pid, Pid, "pt.Pid")
         if math.isinf(self.pid.ti):
             raise ParameterError(
-                "pid has ti = inf: expected a finite integral time, since the observer would keep "
-                "the constant that an incremental PID starts with"
+                "pid",
+                "ti = inf",
+                "a finite integral time, since the observer would keep the constant that an "
+                "incremental PID starts with",
+                verb="has",
             )
-        check_nominal(self.plant_gain, self.plant_time, self.cutoff)
-
-
-def check_nominal(gain: float, time: float, cutoff: float) -> None:
-    """Refuse a nominal plant or a cutoff that is out of its range."""
-    if finite("plant_gain", gain, "m/V") == 0.0:
-        raise ParameterError("plant_gain is 0 m/V: expected a gain other than 0")
-    not_negative("plant_time", time, "s")
-    if not (_core.as_number("cutoff", cutoff) > 0.0):
-        raise ParameterError(
-            f"cutoff is {cutoff} Hz: expected a frequency above 0, or infinity for no filter"
-        )
+        super().__post_init__()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..._support.arguments import finite, positive
+from ... import _core
+from ..._support.arguments import expect
 from ...errors import ParameterError
 from ...stages.feedback.dahl import DahlStage
 from ...stages.input.bouc_wen import BoucWenStage
@@ -71,19 +72,16 @@ class HysteresisObserver(FeedbackLaw):
     stroke: float = 100e-6
 
     def __post_init__(self) -> None:
-        if not isinstance(self.stage, (DahlStage, BoucWenStage)):
-            raise ParameterError(
-                f"stage is {type(self.stage).__name__}: expected pt.DahlStage or pt.BoucWenStage"
-            )
+        expect("stage", self.stage, (DahlStage, BoucWenStage), "pt.DahlStage or pt.BoucWenStage")
         if isinstance(self.stage, DahlStage) and self.stage.b0 != 0.0:
             raise ParameterError(
-                f"stage has b0 = {self.stage.b0:g} N/m: expected 0, as dry friction is not observed"
+                "stage",
+                f"b0 = {self.stage.b0:g} N/m",
+                "0, as dry friction is not observed",
+                verb="has",
             )
-        if not isinstance(self.pid, Pid):
-            raise ParameterError(f"pid is {type(self.pid).__name__}: expected pt.Pid")
-        if not 0.0 <= finite("correction", self.correction, "") <= 1.0:
-            raise ParameterError(f"correction is {self.correction}: expected a share from 0 to 1")
-        positive("stroke", self.stroke, "m")
+        expect("pid", self.pid, Pid, "pt.Pid")
+        super().__post_init__()
 
     @property
     def _numbers(self) -> list[float]:
@@ -99,5 +97,5 @@ class HysteresisObserver(FeedbackLaw):
             # The output in volts, h/d, has its own unit in beta and gamma.
             scale = abs(gain) ** (stage.exponent - 1.0)
             operator = [stage.alpha, stage.beta * scale, stage.gamma * scale, stage.exponent]
-        numbers = static, time, self.correction, self.stroke, *operator
-        return [*self.pid._numbers, *(float(number) for number in numbers)]
+        shares = [_core.as_number(name, getattr(self, name)) for name in ("correction", "stroke")]
+        return [*self.pid._numbers, *map(float, (static, time, *shares, *operator))]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from ..._support.arguments import finite, not_negative, one_of
+from ..._support.arguments import one_of
 from ..parts.part import FeedbackLaw, part
 
 __all__ = ["LeadLag"]
@@ -52,7 +52,5 @@ class LeadLag(FeedbackLaw):
     method: Literal["tustin", "matched"] = "tustin"
 
     def __post_init__(self) -> None:
-        finite("kp", self.kp, "V/m")
-        not_negative("lead", self.lead, "s")
-        not_negative("lag", self.lag, "s")
         one_of("method", self.method, ("tustin", "matched"))
+        super().__post_init__()

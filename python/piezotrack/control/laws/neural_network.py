@@ -78,14 +78,14 @@ class NetworkInverse(Inverse):
 
     def __post_init__(self) -> None:
         if self.initial is not None:
-            raise ParameterError("initial is given: expected none, a network has no stage's state")
+            raise ParameterError("initial", "given", "none, a network has no stage's state")
         try:
             super().__post_init__()
         except (TypeError, ValueError, OverflowError) as error:
             if isinstance(error, PiezotrackError):
                 raise
             raise ParameterError(
-                f"numbers is {quoted(self.numbers)}: expected {', '.join(NETWORK)} of a network"
+                "numbers", quoted(self.numbers), f"{', '.join(NETWORK)} of a network"
             ) from None
 
     def __repr__(self) -> str:
@@ -159,7 +159,7 @@ def train_network(
     memory = _within("plays", plays, 0, MOST_PLAYS)
     share = in_range("held_out", held_out, 0.5, "parts of 1")
     if share < 0.1:
-        raise ParameterError(f"held_out is {share:g}: expected 0.1 to 0.5")
+        raise ParameterError("held_out", f"{share:g}", "0.1 to 0.5")
     late = not_negative("delay", delay, "s")
     generator = np.random.default_rng(_core.as_count("seed", seed))
     full = record.full
@@ -173,7 +173,7 @@ def train_network(
     u, motion = full.u, _motion(full.y - offset, full.dt)
     if not late < record.duration:
         raise ParameterError(
-            f"delay is {late:g} s: expected less than the record lasts, {record.duration:g} s"
+            "delay", f"{late:g} s", f"less than the record lasts, {record.duration:g} s"
         )
     if early := round(late / full.dt):
         # The reading now is the displacement of that much earlier.
@@ -198,7 +198,7 @@ def train_network(
 def _within(name: str, value: object, least: int, most: int) -> int:
     count = _core.as_count(name, value)
     if not least <= count <= most:
-        raise ParameterError(f"{name} is {count}: expected {least} to {most}")
+        raise ParameterError(name, count, f"{least} to {most}")
     return count
 
 

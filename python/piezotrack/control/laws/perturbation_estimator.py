@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ...errors import ParameterError
+from ..._support.arguments import expect
 from ..parts.part import FeedbackLaw, part
-from .disturbance_observer import check_nominal
 from .sliding_mode import SlidingMode
 
 __all__ = ["PerturbationEstimator"]
@@ -54,8 +53,5 @@ class PerturbationEstimator(FeedbackLaw):
     cutoff: float = math.inf
 
     def __post_init__(self) -> None:
-        if not isinstance(self.sliding, SlidingMode):
-            raise ParameterError(
-                f"sliding is {type(self.sliding).__name__}: expected pt.control.SlidingMode"
-            )
-        check_nominal(self.plant_gain, self.plant_time, self.cutoff)
+        expect("sliding", self.sliding, SlidingMode, "pt.control.SlidingMode")
+        super().__post_init__()

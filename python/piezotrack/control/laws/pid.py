@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import finite, not_negative
-from ...errors import ParameterError
 from ..parts.part import FeedbackLaw, part
 
 __all__ = ["Pid"]
@@ -53,16 +51,6 @@ class Pid(FeedbackLaw):
     ti: float
     td: float = 0.0
     tt: float | None = None
-
-    def __post_init__(self) -> None:
-        finite("kp", self.kp, "V/m")
-        if not (_core.as_number("ti", self.ti) > 0.0):
-            raise ParameterError(
-                f"ti is {self.ti} s: expected a time above 0, or infinity for no integral part"
-            )
-        not_negative("td", self.td, "s")
-        if self.tt is not None and not (_core.as_number("tt", self.tt) > 0.0):
-            raise ParameterError(f"tt is {self.tt} s: expected a time above 0")
 
     @property
     def _pid(self) -> Pid:

@@ -68,12 +68,14 @@ class ScheduledPid(FeedbackLaw):
             isinstance(one, Pid) for one in gains
         ):
             raise ParameterError(
-                f"gains has {len(gains)} entries: expected {len(amplitudes) * len(rates)} pt.Pid, "
-                "one for each amplitude and rate"
+                "gains",
+                f"{len(gains)} entries",
+                f"{len(amplitudes) * len(rates)} pt.Pid, one for each amplitude and rate",
+                verb="has",
             )
         first = self.first or (amplitudes[-1], rates[0])
         if not isinstance(first, Sequence) or len(first) != 2:
-            raise ParameterError(f"first is {self.first!r}: expected (amplitude in m, rate in Hz)")
+            raise ParameterError("first", f"{self.first!r}", "(amplitude in m, rate in Hz)")
         first = (positive("first[0]", first[0], "m"), positive("first[1]", first[1], "Hz"))
         checked = {"amplitudes": amplitudes, "rates": rates, "gains": gains, "first": first}
         for name, value in checked.items():
@@ -87,8 +89,8 @@ class ScheduledPid(FeedbackLaw):
 def _axis(name: str, values: object, unit: str) -> tuple[float, ...]:
     listed = values.tolist() if hasattr(values, "tolist") else values
     if not isinstance(listed, Sequence) or not 1 <= len(listed) <= MOST_GRADES:
-        raise ParameterError(f"{name} is {values!r}: expected 1 to {MOST_GRADES} values in {unit}")
+        raise ParameterError(name, f"{values!r}", f"1 to {MOST_GRADES} values in {unit}")
     axis = tuple(positive(name, one, unit) for one in listed)
     if any(after <= before for before, after in pairwise(axis)):
-        raise ParameterError(f"{name} are {axis}: expected them in rising order")
+        raise ParameterError(name, axis, "them in rising order", verb="are")
     return axis

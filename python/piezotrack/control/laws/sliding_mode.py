@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ... import _core
-from ..._support.arguments import not_negative, positive
-from ...errors import ParameterError
 from ..parts.part import FeedbackLaw, part
 
 __all__ = ["SlidingMode"]
@@ -60,13 +57,3 @@ class SlidingMode(FeedbackLaw):
     ti: float = math.inf
     td: float = 0.0
     tf: float = 0.0
-
-    def __post_init__(self) -> None:
-        positive("switching", self.switching, "V")
-        positive("layer", self.layer, "m")
-        if not (_core.as_number("ti", self.ti) > 0.0):
-            raise ParameterError(
-                f"ti is {self.ti} s: expected a time above 0, or infinity for no integral"
-            )
-        not_negative("td", self.td, "s")
-        not_negative("tf", self.tf, "s")

@@ -67,10 +67,10 @@ class StateSpace(FeedbackLaw):
         a, b, c = (_matrix(name, getattr(self, name)) for name in ("a", "b", "c"))
         n = b.size
         if n == 0:
-            raise ShapeError("b has 0 entries: expected one for each state, 1 to 16")
+            raise ShapeError("b", "0 entries", "one for each state, 1 to 16")
         if a.size != n * n or c.size != n:
             raise ShapeError(
-                f"a, b and c have {a.size}, {n} and {c.size} entries: expected n x n, n and n"
+                "a, b and c", f"{a.size}, {n} and {c.size} entries", "n x n, n and n", verb="have"
             )
         back = None if self.back is None else _matrix("back", self.back).tolist()
         return a.tolist(), b.tolist(), c.tolist(), finite("d", _single("d", self.d), "V/m"), back
@@ -80,7 +80,7 @@ class StateSpace(FeedbackLaw):
         # As the core takes them: arrays of other libraries are not kept.
         a, b, c, d, back = self._matrices
         if back == []:
-            raise ParameterError("back is 0 entries: expected as many entries as b")
+            raise ParameterError("back", "0 entries", "as many entries as b")
         return {"a": np.reshape(a, (len(b), -1)).tolist(), "b": b, "c": c, "d": d, "back": back}
 
     @property
@@ -107,9 +107,9 @@ def _matrix(name: str, value: ArrayLike) -> NDArray[np.float64]:
     try:
         entries = real_array(name, value)
     except (DataError, ShapeError):
-        raise ParameterError(f"{name} is {quoted(value)}: expected an array of numbers") from None
+        raise ParameterError(name, quoted(value), "an array of numbers") from None
     if entries.size > MOST_ENTRIES:
-        raise ShapeError(f"{name} has {entries.size} entries: expected {MOST_ENTRIES} at most")
+        raise ShapeError(name, f"{entries.size} entries", f"{MOST_ENTRIES} at most")
     if not np.isfinite(entries).all():
-        raise ParameterError(f"{name} has {entries}: expected finite numbers")
+        raise ParameterError(name, entries, "finite numbers", verb="has")
     return entries.ravel()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..._support.arguments import check_length, in_range, not_negative, one_of, positive
+from ..._support.arguments import check_length, expect, in_range, not_negative, one_of, positive
 from ..._support.arrays import real_array
 from ..._support.messages import quoted
 from ...data.dataset import Dataset
@@ -168,17 +168,16 @@ class IterativeLearning:
         edge = None if cutoff is None else positive("cutoff", cutoff, "Hz")
         if edge is not None and not 1e-6 * rate <= edge <= rate:
             raise ParameterError(
-                f"cutoff is {edge:g} Hz: expected {1e-6 * rate:g} to {rate:g} Hz, half the "
-                "sampling rate"
+                "cutoff", f"{edge:g} Hz", f"{1e-6 * rate:g} to {rate:g} Hz, half the sampling rate"
             )
         step = positive("gain", gain, "parts of 1")
         if step >= 2.0:
-            raise ParameterError(f"gain is {step:g}: expected below 2")
+            raise ParameterError("gain", f"{step:g}", "below 2")
         # The noise of earlier trials is in the table: gain^2 (1 + (1 - gain)^2 + ...) of it.
         self._only_noise = ABOVE_NOISE * float(np.sqrt(2.0 / (2.0 - step)))
         kept = in_range("forgetting_factor", forgetting_factor, 1.0, "parts of 1")
         if kept == 0.0:
-            raise ParameterError("forgetting_factor is 0: expected above 0, at most 1")
+            raise ParameterError("forgetting_factor", "0", "above 0, at most 1")
         self._rule: Rule
         if method == "frequency":
             self._rule = frequency_rule(
@@ -252,7 +251,7 @@ class IterativeLearning:
     def best(self) -> int:
         """Place of the trial with the smallest rms error, 0 for the first."""
         if not self._trials:
-            raise ParameterError("best: expected a trial before it, by update")
+            raise ParameterError("best", "read without a trial", "a trial before it, by update")
         return int(np.argmin([one.rms_error for one in self._trials]))
 
     @property
@@ -343,7 +342,7 @@ class IterativeLearning:
             dt = self._controller.dt
             for record in measured:
                 if not isinstance(record, Dataset):
-                    raise ParameterError(f"measured has {quoted(record)}: expected records only")
+                    raise ParameterError("measured", quoted(record), "records only", verb="has")
                 if abs(record.dt - dt) > 1e-6 * dt:
                     raise DataError(
                         f"measured has a sampling interval of {record.dt:g} s: expected that of "
@@ -353,12 +352,13 @@ class IterativeLearning:
         try:
             records = np.atleast_2d(real_array("measured", measured))
         except ValueError as error:
-            raise ShapeError(f"measured: expected records of one length ({error})") from None
+            raise ShapeError("measured", f"records: {error}", "them of one length") from None
         count = self._t.size
         if records.ndim != 2 or records.shape[1] != count or records.shape[0] < 1:
             raise ShapeError(
-                f"measured has the shape {records.shape}: expected ({count},) or "
-                f"(records, {count}), the samples of a trial"
+                "measured",
+                f"the shape {records.shape}",
+                f"({count},) or (records, {count}), the samples of a trial",
             )
         wrong = np.argwhere(~(np.abs(records) < 1.0))
         if wrong.size:
@@ -377,14 +377,12 @@ def _check_kinds(
         ("controller", controller, Controller),
         ("reference", reference, Reference),
     ):
-        if not isinstance(value, kind):
-            raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+        expect(name, value, kind, f"pt.{kind.__name__}")
     if controller.repetitive is not None:
         raise ParameterError(
-            "controller has a repetitive part, which learns too: expected one without"
+            "controller", "a repetitive part, which learns too", "one without", verb="has"
         )
-    if not isinstance(models, Sequence):
-        raise ParameterError(f"models is {type(models).__name__}: expected a list of models")
+    expect("models", models, Sequence, "a list of models")
 
 
 def one_trial(reference: Reference, method: Method, dt: float) -> Reference:
@@ -393,14 +391,16 @@ def one_trial(reference: Reference, method: Method, dt: float) -> Reference:
         return reference
     if reference.period is None:
         raise ParameterError(
-            f"reference ({reference.name}) does not repeat: expected one that does for method "
-            "'frequency', or method 'lifted'"
+            "reference",
+            f"({reference.name}), which does not repeat",
+            "one that does with method='frequency', or method='lifted'",
         )
     turn = reference.period / dt
     if abs(turn - round(turn)) > 1e-6 or round(turn) < 8:
         raise ParameterError(
-            f"dt is {dt:g} s: expected a whole number of samples in the period, "
-            f"{reference.period:g} s, and 8 or more"
+            "dt",
+            f"{dt:g} s",
+            f"a whole number of samples in the period, {reference.period:g} s, and 8 or more",
         )
     return replace(reference, ramp=0.0, origin=None, duration=reference.period)
 

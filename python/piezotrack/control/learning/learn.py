@@ -375,8 +375,9 @@ def _model_of(
     if not isinstance(controller, Controller) or controller.feedforward is None:
         if isinstance(stage, Device):
             raise ParameterError(
-                "model is not given, and the controller has no feedforward: expected a model of "
-                "the stage behind the device, as pt.identify gives it"
+                "model",
+                "not given, and the controller has no feedforward",
+                "a model of the stage behind the device, as pt.identify gives it",
             )
         return stage
     return VirtualStage.of(controller.feedforward.stage, delay=controller.feedforward.delay)
@@ -391,12 +392,12 @@ def _rest_on(
     """Return the voltage at which a device rests [V], after what it needs is checked."""
     if not isinstance(stage, Device):
         if rest is not None:
-            raise ParameterError(f"rest is {rest!r}: expected none, as the stage is simulated")
+            raise ParameterError("rest", f"{rest!r}", "none, as the stage is simulated")
         return 0.0
     check_playable(stage, controller)
     if timing != Timing(delay=timing.delay):
         raise ParameterError(
-            "timing has jitter or voltages_before: expected none on a device, which has its own"
+            "timing", "jitter or voltages_before", "none on a device, which has its own", verb="has"
         )
     return rest_of(stage, rest)
 
@@ -404,5 +405,5 @@ def _rest_on(
 def _counted(name: str, value: object, most: int) -> int:
     count = _core.as_count(name, value)
     if not 1 <= count <= most:
-        raise ParameterError(f"{name} is {count}: expected 1 to {most}")
+        raise ParameterError(name, count, f"1 to {most}")
     return count

@@ -135,14 +135,14 @@ def learning_plants(
                     name += "" if more == 0.0 else f", {1e3 * more:.3g} ms more delay"
                     found.append(LearningPlant(name, _varied(plant, scale, more), without))
     if nominal is None:
-        raise ParameterError("models is empty: expected a stage or an identified model")
+        raise ParameterError("models", "empty", "a stage or an identified model")
     return nominal, found
 
 
 def _some(name: str, given: float | Sequence[float]) -> tuple[float, ...]:
     listed = one_or_more_numbers(name, given)
     if not listed:
-        raise ParameterError(f"{name} is empty: expected a number or several")
+        raise ParameterError(name, "empty", "a number or several")
     return listed
 
 

@@ -107,7 +107,7 @@ def _trial(learnt: ArrayLike, error: ArrayLike, samples: int) -> tuple[Array, Ar
     trial = signal_of("learnt", learnt), signal_of("error", error)
     for name, values in zip(("learnt", "error"), trial, strict=True):
         if values.size != samples:
-            raise ShapeError(f"{name} has {values.size} samples: expected {samples}, as a trial")
+            raise ShapeError(name, f"{values.size} samples", f"{samples}, as a trial")
     return trial
 
 
@@ -187,7 +187,7 @@ class FrequencyRule:
         half = _core.as_count("half", half)
         if not 1 <= half <= (self.samples - 1) // 2:
             raise ParameterError(
-                f"half is {half}: expected 1 to {(self.samples - 1) // 2}, less than half a period"
+                "half", half, f"1 to {(self.samples - 1) // 2}, less than half a period"
             )
         window = np.cos(0.5 * np.pi * np.arange(-half, half + 1) / (half + 1)) ** 2
         filters = (self.smoothing * self.learning, self.smoothing * self.forgetting_factor)
@@ -309,15 +309,18 @@ def lifted_rule(
 
     if samples > LONGEST_LIFTED:
         raise ParameterError(
-            f"reference has {samples} samples: expected {LONGEST_LIFTED} at most for method "
-            "'lifted'; take a longer dt, or method 'frequency' for one that repeats"
+            "reference",
+            f"{samples} samples",
+            f"{LONGEST_LIFTED} at most with method='lifted'; take a longer dt, or "
+            "method='frequency' for one that repeats",
+            verb="has",
         )
     dt, pulse = nominal.controller.dt, nominal.impulse(samples)
     late = int(np.argmax(np.abs(pulse) > NOTHING * np.abs(pulse).max()))
     count = samples - late
     if count < 8:
         raise ParameterError(
-            f"reference has {samples} samples: expected 8 more than the {late} of the delay"
+            "reference", f"{samples} samples", f"8 more than the {late} of the delay", verb="has"
         )
 
     def lifted(response: Array) -> Array:
@@ -436,5 +439,7 @@ def _converging(best: R, asked: R | None) -> R:
     found = rule.convergence
     raise ParameterError(
         f"learning does not converge on {found.model}: at {found.frequency:.4g} Hz a trial leaves "
-        f"{found.factor:.4g} times the distance to the final table: expected below 1, with {remedy}"
+        f"{found.factor:.4g} times the distance to the final table: expected below 1, with "
+        f"{remedy}",
+        argument="cutoff",
     )

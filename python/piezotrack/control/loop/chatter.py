@@ -73,7 +73,7 @@ def chatter(run: Tracking, *, after: float = 0.0) -> Chatter:
     volts = np.asarray(run.voltage)[np.asarray(run.t) >= after]
     if volts.size < 16:
         raise ParameterError(
-            f"after is {after:g} s, which leaves {volts.size} samples: expected 16 or more"
+            "after", f"{after:g} s, which leaves {volts.size} samples", "16 or more"
         )
     return chatter_of(volts)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import number_pair
+from ..._support.arguments import expect, number_pair
 from ..._support.display.frames import frame_of
 from ..._support.display.result import Result
 from ..._support.files.writing import write_result
@@ -381,10 +381,8 @@ def contour(
     >>> run.metrics.peak_to_peak < 1.5e-6
     True
     """
-    if not isinstance(stage, XYStage):
-        raise ParameterError(f"stage is {type(stage).__name__}: expected pt.XYStage")
-    if not isinstance(path, XYReference):
-        raise ParameterError(f"path is {type(path).__name__}: expected pt.XYReference")
+    expect("stage", stage, XYStage, "pt.XYStage")
+    expect("path", path, XYReference, "pt.XYReference")
     both = _two(controllers)
     substeps = _core.as_count("substeps", substeps)
     free = {
@@ -398,7 +396,7 @@ def contour(
         try:
             run.check(axis, of_x.delay, **free)
         except ParameterError as error:
-            raise ParameterError(f"{name}: {error}") from None
+            raise error.of(name) from None
     ahead = x, y
     if decoupling is not None:
         offsets = stage.x.sensor.offset, stage.y.sensor.offset
@@ -469,8 +467,7 @@ def workspace(
     >>> print(f"{1e6 * middle[0]:.0f} um")
     60 um
     """
-    if not isinstance(stage, XYStage):
-        raise ParameterError(f"stage is {type(stage).__name__}: expected pt.XYStage")
+    expect("stage", stage, XYStage, "pt.XYStage")
     alone = np.ndim(limits[0]) == 0
     pairs = [number_pair("limits", one, "V") for one in ([limits] * 2 if alone else limits)]
     axes = list(zip((stage.x, stage.y), pairs, strict=True))
@@ -485,10 +482,10 @@ def _two(controllers: Sequence[Controller]) -> tuple[Controller, Controller]:
     both = [one for one in given if isinstance(one, Controller)]
     if not len(given) == len(both) == 2:
         kinds = ", ".join(type(one).__name__ for one in given) or type(controllers).__name__
-        raise ParameterError(f"controllers are {kinds}: expected two pt.Controller, for x and y")
+        raise ParameterError("controllers", kinds, "two pt.Controller, for x and y", verb="are")
     x, y = both
     if x.dt != y.dt:
-        raise ParameterError(f"dt of y is {y.dt:g} s: expected that of x, {x.dt:g} s")
+        raise ParameterError("dt of y", f"{y.dt:g} s", f"that of x, {x.dt:g} s")
     return x, y
 
 
@@ -501,5 +498,5 @@ def _runs(both: tuple[Controller, Controller], path: XYReference) -> tuple[Run, 
 def _inverse(matrix: ArrayLike) -> Array:
     rows = square_matrix("decoupling", matrix)
     if abs(float(np.linalg.det(rows))) < 1e-3:
-        raise ParameterError(f"decoupling is {rows.tolist()}: expected a matrix near unity")
+        raise ParameterError("decoupling", rows.tolist(), "a matrix near unity")
     return np.asarray(np.linalg.inv(rows), dtype=np.float64)

@@ -34,8 +34,9 @@ def check_delay(stage: VirtualStage, delay: float, dt: float) -> None:
     whole, most = not_negative("delay", delay, "s") + stage.sensor.delay, MOST_INTERVALS * dt
     if whole > most:
         raise ParameterError(
-            f"delay is {whole:.6g} s in all: expected {most:.6g} s at most, "
-            f"{MOST_INTERVALS} control intervals"
+            "delay",
+            f"{whole:.6g} s in all",
+            f"{most:.6g} s at most, {MOST_INTERVALS} control intervals",
         )
 
 
@@ -46,8 +47,10 @@ def check_drive_unit(stage: object, controller: Controller) -> None:
     unit, other = stage.drive_unit, controller.drive_unit
     if "m" in (unit, other) and unit != other:
         raise ParameterError(
-            f"controller has the drive_unit {other!r}: expected that of the model, {unit!r}, as "
-            "pt.Controller.of gives it"
+            "controller",
+            f"the drive_unit {other!r}",
+            f"that of the model, {unit!r}, as pt.Controller.of gives it",
+            verb="has",
         )
 
 
@@ -57,8 +60,9 @@ def check_period(controller: Controller, reference: Reference) -> None:
         return
     if reference.period is None:
         raise ParameterError(
-            f"reference ({reference.name}) does not repeat: expected one that does, for the "
-            "repetitive part"
+            "reference",
+            f"({reference.name}), which does not repeat",
+            "one that does, for the repetitive part",
         )
     check_turns(controller, reference.period, f"reference ({reference.name})")
 
@@ -70,8 +74,10 @@ def check_turns(controller: Controller, period: float, whose: str) -> None:
     turns = controller.repetitive.period / period
     if abs(turns - max(1, round(turns))) > 1e-6 * turns:
         raise ParameterError(
-            f"repetitive has a period of {controller.repetitive.period:g} s: expected that of the "
-            f"{whose}, {period:g} s, or a multiple"
+            "repetitive",
+            f"a period of {controller.repetitive.period:g} s",
+            f"that of the {whose}, {period:g} s, or a multiple",
+            verb="has",
         )
 
 
@@ -103,7 +109,8 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
     elif controller.repetitive is not None:
         found += "; without the repetitive part it is stable, so lower kq or take another filter"
     hint = f" ({middle.hint})" if middle.hint else ""
-    raise ParameterError(f"{found}{hint}: expected a stable one, or unstable=True")
+    words = f"{found}{hint}: expected a stable one, or unstable=True"
+    raise ParameterError(words, argument="controller")
 
 
 def check_within_reach(
@@ -124,10 +131,11 @@ def check_within_reach(
         if past > slack:
             k = int(np.flatnonzero(samples.x == value)[0])
             raise ParameterError(
-                f"reference is {1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um "
-                f"beyond {1e6 * edge:.4g} um: expected {1e6 * bottom:.4g} to {1e6 * top:.4g} um "
-                f"on the sensor, which this stage reaches from {scale * low:g} to "
-                f"{scale * high:g} {unit}, or beyond_reach=True"
+                "reference",
+                f"{1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um beyond "
+                f"{1e6 * edge:.4g} um",
+                f"{1e6 * bottom:.4g} to {1e6 * top:.4g} um on the sensor, which this stage "
+                f"reaches from {scale * low:g} to {scale * high:g} {unit}, or beyond_reach=True",
             )
     # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
     k = int(np.argmax(samples.x))
@@ -135,8 +143,9 @@ def check_within_reach(
     lowest = lowest_settled_displacement(stage, (low, high), float(samples.x.max()), 1e-3)
     if (past := lowest - samples.x[k]) > slack:
         raise ParameterError(
-            f"reference is {1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} "
-            f"um below {1e6 * lowest:.4g} um: expected what the stage reaches at {scale * low:g} "
-            f"{unit} on the settled loop, from {1e6 * samples.x.max():.4g} um down, or "
-            "beyond_reach=True"
+            "reference",
+            f"{1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um below "
+            f"{1e6 * lowest:.4g} um",
+            f"what the stage reaches at {scale * low:g} {unit} on the settled loop, from "
+            f"{1e6 * samples.x.max():.4g} um down, or beyond_reach=True",
         )

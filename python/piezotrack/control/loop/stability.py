@@ -238,7 +238,7 @@ class LoopReport(Result):
         highest = 0.499 / self.controller.dt
         count = max(2, _core.as_count("count", count))
         if count > 100_000:
-            raise ParameterError(f"count is {count}: expected 100000 at most")
+            raise ParameterError("count", count, "100000 at most")
         frequency = np.geomspace(1e-3 * highest, highest, count)
         curves = _core.loop_response(self.controller._core, self.plant, frequency.tolist())
         *pairs, learning = curves

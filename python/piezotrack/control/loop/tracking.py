@@ -206,8 +206,10 @@ class Tracking(Result):
         part: NDArray[np.bool_] = (t >= first - 1e-9) & (t < last - 1e-9)
         if part.sum() < 2:
             raise ParameterError(
-                f"start and stop are {first:g} and {last:g} s: expected a part of the run, 0 to "
-                f"{self.t[-1]:g} s, with two samples"
+                "start and stop",
+                f"{first:g} and {last:g} s",
+                f"a part of the run, 0 to {self.t[-1]:g} s, with two samples",
+                verb="are",
             )
         return part
 

@@ -146,7 +146,10 @@ def track_on(
     check_limits(device, controller)
     if controller.drive_unit != "V":
         raise ParameterError(
-            f"controller commands in {controller.drive_unit}: expected V, which a device puts out"
+            "controller",
+            f"in {controller.drive_unit}",
+            "V, which a device puts out",
+            verb="commands",
         )
     home = rest_of(device, safe)
     check_period(controller, reference)

@@ -82,9 +82,10 @@ def refuse_slow(late: Latency, dt: float) -> None:
     if late.p99 > MOST * dt:
         slowest = late.p99 / MOST
         raise ParameterError(
-            f"dt of the controller is {1e3 * dt:.4g} ms: expected {1e3 * slowest:.3g} ms or more "
-            f"on this computer with this device, whose voltage is late by {late}; a table "
-            "(pt.play, pt.learn) goes out on the device's own clock"
+            "dt of the controller",
+            f"{1e3 * dt:.4g} ms",
+            f"{1e3 * slowest:.3g} ms or more on this computer with this device, whose voltage "
+            f"is late by {late}; a table (pt.play, pt.learn) goes out on the device's own clock",
         )
 
 
@@ -100,8 +101,9 @@ def check_exchanging(device: object) -> Exchanging:
     check_device(device)
     if not isinstance(device, Exchanging):
         raise ParameterError(
-            f"device is {type(device).__name__}, which has no exchange: expected one that can be "
-            "asked sample by sample; pt.play and pt.learn need none"
+            "device",
+            f"{type(device).__name__}, which has no exchange",
+            "one that can be asked sample by sample; pt.play and pt.learn need none",
         )
     return device
 

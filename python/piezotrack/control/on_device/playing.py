@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import finite, not_negative
+from ..._support.arguments import expect, finite, not_negative
 from ...errors import ParameterError
 from ...hardware.measuring import (
     RAMP,
@@ -42,32 +42,39 @@ def check_limits(device: Device, controller: Controller) -> None:
     least, most = controller.limits
     if not low <= least < most <= high:
         raise ParameterError(
-            f"limits of the controller are {least:g} to {most:g} V: expected a range within "
-            f"{low:g} to {high:g} V, the limits of {device.channels[0]}"
+            "limits of the controller",
+            f"{least:g} to {most:g} V",
+            f"a range within {low:g} to {high:g} V, the limits of {device.channels[0]}",
+            verb="are",
         )
 
 
 def check_playable(device: Device, controller: Controller) -> None:
     """Raise ParameterError unless a controller is a feedforward that a device can play."""
     check_device(device)
-    if not isinstance(controller, Controller):
-        raise ParameterError(f"controller is {type(controller).__name__}: expected pt.Controller")
+    expect("controller", controller, Controller, "pt.Controller")
     if controller.drive_unit != "V":
         raise ParameterError(
-            f"controller commands in {controller.drive_unit}: expected V, which a device puts out"
+            "controller",
+            f"in {controller.drive_unit}",
+            "V, which a device puts out",
+            verb="commands",
         )
     given = {"feedback": controller.feedback, "repetitive": controller.repetitive}
     if present := [name for name, part in given.items() if part is not None]:
         raise ParameterError(
-            f"controller has {' and '.join(present)}, which a table cannot have: expected "
-            "feedforward alone; pt.track closes the loop on a device"
+            "controller",
+            f"{' and '.join(present)}, which a table cannot have",
+            "feedforward alone; pt.track closes the loop on a device",
+            verb="has",
         )
     check_limits(device, controller)
     near, notes = obtained_rate(device, 1.0 / controller.dt)
     if notes and abs(near * controller.dt - 1.0) > 1e-6:
         raise ParameterError(
-            f"dt of the controller is {controller.dt:.9g} s: expected {1.0 / near:.9g} s, an "
-            f"interval that {device.channels[0]} plays at"
+            "dt of the controller",
+            f"{controller.dt:.9g} s",
+            f"{1.0 / near:.9g} s, an interval that {device.channels[0]} plays at",
         )
 
 
@@ -171,18 +178,19 @@ def play(
     28 nm
     """
     check_device(device)
-    if not isinstance(reference, Reference):
-        raise ParameterError(f"reference is {type(reference).__name__}: expected pt.Reference")
+    expect("reference", reference, Reference, "pt.Reference")
     if isinstance(controller, Inverse):
         if rate is None:
-            raise ParameterError("rate is not given: expected the sampling rate of an inverse, Hz")
+            raise ParameterError("rate", "not given", "the sampling rate of an inverse, Hz")
         obtained, _ = obtained_rate(device, _core.as_number("rate", rate))
         controller = Controller(dt=1.0 / obtained, limits=device.limits, feedforward=controller)
     elif rate is not None:
-        raise ParameterError(f"rate is {rate!r}: expected none, as the controller has an interval")
+        raise ParameterError("rate", f"{rate!r}", "none, as the controller has an interval")
     check_playable(device, controller)
     if controller.feedforward is None:
-        raise ParameterError("controller has no feedforward: expected one, as fit.inverse() gives")
+        raise ParameterError(
+            "controller", "no feedforward", "one, as fit.inverse() gives", verb="has"
+        )
     run = Run(controller, reference)
     volts, note = run.feedforward
     volts = np.clip(volts, *controller.limits)

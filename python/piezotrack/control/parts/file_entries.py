@@ -119,8 +119,9 @@ def part_of(place: str, entry: Any, kinds: Iterable[str], drive: str) -> Any:
     known = list(kinds)
     kind = entry.get("kind") if isinstance(entry, dict) else None
     if kind not in known:
-        found = f"kind is {quoted(kind)}" if isinstance(entry, dict) else f"it is {quoted(entry)}"
-        raise ParameterError(f"{place}: {found}: expected one of {', '.join(map(repr, known))}")
+        subject, value = ("kind", kind) if isinstance(entry, dict) else ("it", entry)
+        expected = f"one of {', '.join(map(repr, known))}"
+        raise ParameterError(f"{place}: {subject}", quoted(value), expected)
     made = part_class(kind)
     keys = {one.key(drive): one for one in _ordered(made)}
     only(place, entry, ["kind", *keys])
@@ -130,7 +131,7 @@ def part_of(place: str, entry: Any, kinds: Iterable[str], drive: str) -> Any:
     try:
         return made(**values)
     except ParameterError as error:
-        raise ParameterError(f"{place}: {error}") from None
+        raise error.of(place) from None
 
 
 def only(place: str, entry: Mapping[str, Any], keys: Iterable[str]) -> None:
@@ -155,9 +156,9 @@ def only(place: str, entry: Mapping[str, Any], keys: Iterable[str]) -> None:
     for key, value in entry.items():
         if key not in known:
             expected = ", ".join(map(repr, missing or known))
-            raise ParameterError(f"{before}{quoted(key)} is {quoted(value)}: expected {expected}")
+            raise ParameterError(f"{before}{quoted(key)}", quoted(value), expected)
     if missing:
-        raise ParameterError(f"{before}{missing[0]!r} is missing: expected all of {known}")
+        raise ParameterError(f"{before}{missing[0]!r}", "missing", f"all of {known}")
 
 
 def _read(place: str, number: Number, value: Any, drive: str) -> Any:
@@ -192,5 +193,5 @@ def _number(place: str, value: Any) -> float | None:
     if value == INFINITE:
         return math.inf
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ParameterError(f"{place} is {quoted(value)}: expected a number, or 'inf'")
+        raise ParameterError(place, quoted(value), "a number, or 'inf'")
     return float(value)

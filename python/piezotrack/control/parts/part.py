@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 import numpy as np
 
 from ... import _core
+from ..._support.arrays import SHORTEST
 from .part_info import LISTED, PartInfo
 
 if TYPE_CHECKING:
@@ -61,7 +62,11 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class FeedbackLaw(Part):
-    """Base class of the feedback laws."""
+    """Base class of the feedback laws, whose numbers the core checks."""
+
+    def __post_init__(self) -> None:
+        # At the shortest sampling interval, with which the interval itself forbids least.
+        _core.law_transfer_function(self._settings, SHORTEST)
 
     @property
     def _pid(self) -> Any:
@@ -129,7 +134,7 @@ def _flat(of: Number, value: Any) -> list[Any]:
             return [number for one in value for number in one._numbers]
         case "word":
             return [of.choices.index(value)]
-    return [math.nan if value is None else value]
+    return [math.nan if value is None and of.is_optional else _core.as_number(of.name, value)]
 
 
 def _in_powers_of_z(coefficients: list[float]) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -57,7 +57,7 @@ class ZeroPhase(Part):
 
     def __post_init__(self) -> None:
         if not 1 <= _core.as_count("order", self.order) <= 4:
-            raise ParameterError(f"order is {self.order}: expected 1 to 4")
+            raise ParameterError("order", self.order, "1 to 4")
 
 
 # The filter of the paper, and the default.
@@ -120,17 +120,16 @@ class Repetitive(Part):
         positive("period", self.period, "s")
         if not 0.0 < _core.as_number("kq", self.kq) < 2e6:
             raise ParameterError(
-                f"kq is {self.kq:g} V/m: expected above 0 and below 2e6 V/m (2 V/um), equation (28)"
+                "kq", f"{self.kq:g} V/m", "above 0 and below 2e6 V/m (2 V/um), equation (28)"
             )
         if not (self.smoothing is None or isinstance(self.smoothing, (Lag, ZeroPhase))):
             raise ParameterError(
-                f"smoothing is {self.smoothing!r}: expected pt.control.Lag, pt.control.ZeroPhase "
-                "or None"
+                "smoothing", f"{self.smoothing!r}", "pt.control.Lag, pt.control.ZeroPhase or None"
             )
         if _core.as_count("lead", self.lead) >= 2**32:
-            raise ParameterError(f"lead is {self.lead}: expected less than the period allows")
+            raise ParameterError("lead", self.lead, "less than the period allows")
         if in_range("forgetting_factor", self.forgetting_factor, 1.0, "parts of 1") == 0.0:
-            raise ParameterError("forgetting_factor is 0: expected above 0, at most 1")
+            raise ParameterError("forgetting_factor", "0", "above 0, at most 1")
         _core.as_truth("pause", self.pause)
 
     @classmethod
@@ -178,11 +177,11 @@ class Repetitive(Part):
         """
         gain = _core.as_number("kq", kq)
         if not 0.0 < gain < 2.0:
-            raise ParameterError(f"kq is {kq} V/um: expected above 0 and below 2, equation (28)")
+            raise ParameterError("kq", f"{kq} V/um", "above 0 and below 2, equation (28)")
         if tq is not None:
             if smoothing is not LAG:
                 raise ParameterError(
-                    f"tq is {tq} s beside smoothing, which is {smoothing!r}: expected one of them"
+                    "tq", f"{tq} s beside smoothing, which is {smoothing!r}", "one of them"
                 )
             smoothing = Lag(tq=tq)
         return cls(

@@ -94,17 +94,17 @@ def track(
         ("reference", reference, Reference),
     ):
         if not isinstance(value, kind):
-            raise ParameterError(f"{name} is {type(value).__name__}: expected pt.{kind.__name__}")
+            raise ParameterError(name, type(value).__name__, f"pt.{kind.__name__}")
     if isinstance(stage, Device):
         if timing is not None or substeps != 10:
             raise ParameterError(
-                "timing or substeps is given: expected neither on a device, which has its own"
+                "timing or substeps", "given", "neither on a device, which has its own"
             )
         return track_on(
             stage, controller, reference, safe=safe, beyond_reach=beyond_reach, unstable=unstable
         )
     if safe is not None:
-        raise ParameterError(f"safe is {safe!r}: expected none, as the stage is simulated")
+        raise ParameterError("safe", f"{safe!r}", "none, as the stage is simulated")
     plant = plant_of(stage)
     check_drive_unit(stage, controller)
     timing = timing_on(plant, timing, controller.limits)

@@ -91,9 +91,7 @@ def parts_named(parts: object) -> tuple[str, ...] | None:
         return None
     named = (parts,) if isinstance(parts, str) else parts
     if not isinstance(named, Sequence) or any(one not in PARTS for one in named):
-        raise ParameterError(
-            f"parts is {quoted(parts)}: expected some of {', '.join(map(repr, PARTS))}"
-        )
+        raise ParameterError("parts", quoted(parts), f"some of {', '.join(map(repr, PARTS))}")
     return ("pid", *(one for one in PARTS[1:] if one in named))
 
 
@@ -124,13 +122,15 @@ def box_of(
     largest = max((abs(gain) for gain in gains if math.isfinite(gain)), default=0.0)
     if largest == 0.0 or min(gains) * max(gains) <= 0.0:
         raise ParameterError(
-            f"models have static gains of {min(gains):.4g} to {max(gains):.4g} m/V: expected "
-            "finite ones, all of one sign"
+            "models",
+            f"static gains of {min(gains):.4g} to {max(gains):.4g} m/V",
+            "finite ones, all of one sign",
+            verb="have",
         )
     sign = math.copysign(1.0, gains[0])
     if sign < 0.0 and "switching" in SOUGHT[law]:
         raise ParameterError(
-            f"law is {law!r}, but the stage falls as the voltage rises: expected one that rises"
+            "law", f"{law!r}, but the stage falls as the voltage rises", "one that rises"
         )
     ranges = law_ranges(law, largest, dt, limits)
     if "low-pass" in parts:
@@ -141,11 +141,13 @@ def box_of(
         ranges += _notch(plants, dt)
     if "repetitive" in parts:
         if period is None:
-            raise ParameterError("parts has 'repetitive': expected references that repeat")
+            raise ParameterError("parts", "'repetitive'", "references that repeat", verb="has")
         if sign < 0.0:
             raise ParameterError(
-                "parts has 'repetitive', but the stage falls as the voltage rises: expected one "
-                "that rises, for its learning gain is above 0"
+                "parts",
+                "'repetitive', but the stage falls as the voltage rises",
+                "one that rises, for its learning gain is above 0",
+                verb="has",
             )
         longest = min(24.0, math.floor(period / dt / 4.0))
         ranges += [
@@ -162,8 +164,10 @@ def _notch(plants: Sequence[_core.LoopPlant], dt: float) -> list[tuple[str, floa
     modes = resonance(plants, dt)
     if modes is None:
         raise ParameterError(
-            f"parts has 'notch': expected a mode that rings below half the sampling rate, "
-            f"{0.5 / dt:.4g} Hz"
+            "parts",
+            "'notch'",
+            f"a mode that rings below half the sampling rate, {0.5 / dt:.4g} Hz",
+            verb="has",
         )
     low, high = 0.7 * modes[0], min(1.3 * modes[1], NYQUIST / dt)
     return [

@@ -68,15 +68,14 @@ class Goal:
         for name, words in (("minimise", tuple(MINIMISED)), ("error", ERRORS)):
             if getattr(self, name) not in words:
                 expected = ", ".join(map(repr, words))
-                raise ParameterError(
-                    f"{name} is {quoted(getattr(self, name))}: expected one of {expected}"
-                )
+                raise ParameterError(name, quoted(getattr(self, name)), f"one of {expected}")
         for name in ("effort", "slew", "largest_error", "largest_saturation"):
             object.__setattr__(self, name, _core.as_number(name, getattr(self, name)))
         if self.minimise == "effort" and self.largest_error == math.inf:
             raise ParameterError(
-                "minimise is 'effort' without largest_error: expected the largest rms error in m, "
-                "for the least effort is none"
+                "minimise",
+                "'effort' without largest_error",
+                "the largest rms error in m, for the least effort is none",
             )
 
 
@@ -116,4 +115,4 @@ class TuningSearch:
         for name in ("particles", "iterations", "seed", "draws"):
             object.__setattr__(self, name, _core.as_count(name, getattr(self, name)))
         if not 1 <= self.draws <= MOST_DRAWS:
-            raise ParameterError(f"draws is {self.draws}: expected 1 to {MOST_DRAWS}")
+            raise ParameterError("draws", self.draws, f"1 to {MOST_DRAWS}")

@@ -61,13 +61,13 @@ class Margins:
         for name in ("gain", "sensitivity"):
             value = getattr(self, name)
             if not 1.0 < _core.as_number(name, value) < math.inf:
-                raise ParameterError(f"{name} is {value}: expected a factor above 1")
+                raise ParameterError(name, value, "a factor above 1")
         if not 0.0 <= _core.as_number("phase", self.phase) < math.pi:
             raise ParameterError(
-                f"phase is {self.phase} rad: expected 0 to below pi; 30 degrees are 0.524 rad"
+                "phase", f"{self.phase} rad", "0 to below pi; 30 degrees are 0.524 rad"
             )
         if not 0.0 < _core.as_number("learning", self.learning) <= 1.0:
-            raise ParameterError(f"learning is {self.learning}: expected above 0, at most 1")
+            raise ParameterError("learning", self.learning, "above 0, at most 1")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,15 +103,13 @@ class Spread:
 
     def __post_init__(self) -> None:
         if not isinstance(self.delay, Sequence) or len(self.delay) != 2:
-            raise ParameterError(f"delay is {self.delay!r}: expected (least, largest) in s")
+            raise ParameterError("delay", f"{self.delay!r}", "(least, largest) in s")
         low, high = (not_negative("delay", one, "s") for one in self.delay)
         if low > high:
-            raise ParameterError(f"delay is ({low:g}, {high:g}) s: expected the lower one first")
+            raise ParameterError("delay", f"({low:g}, {high:g}) s", "the lower one first")
         for name in ("mode", "gain"):
             if not 0.0 <= finite(name, getattr(self, name), "") < 0.95:
-                raise ParameterError(
-                    f"{name} is {getattr(self, name)}: expected a share, 0 to below 0.95"
-                )
+                raise ParameterError(name, getattr(self, name), "a share, 0 to below 0.95")
 
 
 class NamedPlant(NamedTuple):

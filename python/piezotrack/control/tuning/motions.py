@@ -118,7 +118,9 @@ def _samples(
         try:
             check_within_reach(plant_of(stage), problem.limits, samples, problem.drive_unit)
         except ParameterError as error:
-            words = str(error).replace("or beyond_reach=True", "or largest_saturation=0.5 or more")
-            which = f"model {i}: " if len(axis.stages) > 1 else axis.prefix
-            raise ParameterError(f"{which}{words}") from None
+            error.args = (
+                str(error).replace("beyond_reach=True", "largest_saturation=0.5 or more"),
+            )
+            which = f"model {i}" if len(axis.stages) > 1 else axis.name
+            raise error.of(which) from None
     return samples

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ... import _core
-from ..._support.arguments import given_or, number_pair, one_of
+from ..._support.arguments import expect, given_or, number_pair, one_of
 from ..._support.arrays import check_dt
 from ..._support.messages import quoted
 from ...errors import ParameterError
@@ -135,8 +135,9 @@ class TuningProblem:
         goal = given_or("goal", goal, Goal())
         if goal.largest_error < math.inf and not references:
             raise ParameterError(
-                f"largest_error is {1e6 * goal.largest_error:g} um without a reference: expected "
-                "one to follow"
+                "largest_error",
+                f"{1e6 * goal.largest_error:g} um without a reference",
+                "one to follow",
             )
         model = stages[0] if isinstance(stages[0], IdentifiedModel) else None
         intervals = _intervals(dt, model)
@@ -193,14 +194,14 @@ def _of_both(name: str, given: Any, apart: bool) -> list[Any]:
     """Return what is given for x and for y: the same where it is not given apart."""
     pair = list(given) if apart and isinstance(given, Sequence) else [given] * 2
     if len(pair) != 2:
-        raise ParameterError(f"{name} has {len(pair)} entries: expected that of x and of y")
+        raise ParameterError(name, f"{len(pair)} entries", "that of x and of y", verb="has")
     return pair
 
 
 def _stages(stage: Any) -> list[Plant | IdentifiedModel]:
     stages = list(stage) if isinstance(stage, Sequence) else [stage]
     if not stages:
-        raise ParameterError("stage is empty: expected a stage or more")
+        raise ParameterError("stage", "empty", "a stage or more")
     for one in stages:
         plant_of(one)
     return stages
@@ -210,12 +211,12 @@ def _references(reference: Any, kind: type) -> list[Any]:
     given = [] if reference is None else reference
     references = list(given) if isinstance(given, Sequence) else [given]
     for one in references:
-        if not isinstance(one, kind):
-            raise ParameterError(f"reference is {type(one).__name__}: expected pt.{kind.__name__}")
+        expect("reference", one, kind, f"pt.{kind.__name__}")
     if kind is XYReference and not references:
         raise ParameterError(
-            "reference is missing: expected a path; gains from margins alone are tuned for one "
-            "axis after the other"
+            "reference",
+            "missing",
+            "a path; gains from margins alone are tuned for one axis after the other",
         )
     return references
 
@@ -223,16 +224,19 @@ def _references(reference: Any, kind: type) -> list[Any]:
 def _check_has_integral_part(law: str, references: list[Reference]) -> None:
     if not references and "ki" not in SOUGHT[law]:
         raise ParameterError(
-            f"law is {law!r} without a reference: expected one with an integral part, whose gain "
-            "is made large then"
+            "law",
+            f"{law!r} without a reference",
+            "one with an integral part, whose gain is made large then",
         )
 
 
 def _check_feedforward(law: str, axis: Axis) -> None:
     if law == "pd" and axis.feedforward is None:
         raise ParameterError(
-            f"{axis.prefix}law is 'pd' without feedforward: expected feedforward=, for nothing "
-            "else brings the stage to where it is to be, or a law with an integral part"
+            f"{axis.prefix}law",
+            "'pd' without feedforward",
+            "feedforward=, for nothing else brings the stage to where it is to be, or a law with "
+            "an integral part",
         )
 
 
@@ -241,25 +245,25 @@ def _limits(limits: Any, model: IdentifiedModel | None, unit: str) -> tuple[floa
     if known is None and model is not None:
         known = model.drive_range
     if known is None:
-        raise ParameterError("limits are missing: expected (low, high) in V")
+        raise ParameterError("limits", "missing", "(low, high) in V", verb="are")
     return number_pair("limits", known, unit)
 
 
 def _filters(filters: Any) -> tuple[LowPass | Notch, ...]:
     listed = tuple(filters) if isinstance(filters, Sequence) else None
     if listed is None or not all(isinstance(one, Filter) for one in listed):
-        raise ParameterError(f"filters is {filters!r}: expected a list of pt.LowPass and pt.Notch")
+        raise ParameterError("filters", f"{filters!r}", "a list of pt.LowPass and pt.Notch")
     return listed
 
 
 def _intervals(dt: Any, model: IdentifiedModel | None) -> list[float]:
     if dt is None:
         if model is None or model.dt is None:
-            raise ParameterError("dt is missing: expected the sampling interval of the loop in s")
+            raise ParameterError("dt", "missing", "the sampling interval of the loop in s")
         dt = model.dt
     several = list(dt) if isinstance(dt, Sequence) else [dt]
     if not several:
-        raise ParameterError("dt is empty: expected a sampling interval in s or more")
+        raise ParameterError("dt", "empty", "a sampling interval in s or more")
     return [check_dt(one) for one in several]
 
 
@@ -267,9 +271,7 @@ def _inverse_of(stage: Plant | IdentifiedModel, feedforward: Any) -> Inverse | N
     if feedforward is None or isinstance(feedforward, Inverse):
         return feedforward
     if feedforward != "inverse":
-        raise ParameterError(
-            f"feedforward is {quoted(feedforward)}: expected 'inverse', a pt.Inverse or None"
-        )
+        raise ParameterError("feedforward", quoted(feedforward), "'inverse', a pt.Inverse or None")
     if isinstance(stage, (IdentifiedModel, Stage)):
         return stage.inverse()
     return None

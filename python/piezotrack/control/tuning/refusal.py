@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from ...errors import ParameterError
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -31,15 +33,17 @@ class _Short(NamedTuple):
             return self.bound / max(self.value, 1e-9)
         return self.value / self.bound
 
-    def sentence(self, names: Sequence[str]) -> str:
-        """Write the bound, and the margin of the nearest gains."""
+    def refusal(self, names: Sequence[str]) -> ParameterError:
+        """Name the bound, and the margin of the nearest gains."""
         side = "more" if self.least else "less"
         off = f", {self.factor:.4g} times too {'low' if self.least else 'high'}"
         bound = f"{_number(self.bound)}{self.unit}"
-        return (
-            f"margins.{self.name} is {bound}: expected one that some gains can keep; where {bound} "
-            f"or {side} was asked for, the nearest have {self.value:.6g}{self.unit} "
-            f"({names[self.plant]}){off if self.factor > 1.1 else ''}"
+        return ParameterError(
+            f"margins.{self.name}",
+            bound,
+            f"one that some gains can keep; where {bound} or {side} was asked for, the nearest "
+            f"have {self.value:.6g}{self.unit} "
+            f"({names[self.plant]}){off if self.factor > 1.1 else ''}",
         )
 
 
@@ -49,40 +53,47 @@ def _number(value: float) -> str:
     return short if float(short) == value else f"{value:.9g}"
 
 
-def refusal(problem: TuningProblem, nearest: Solution) -> str:
+def refusal(problem: TuningProblem, nearest: Solution) -> ParameterError:
     """Say which constraint forbids any controller, and how far the nearest one is off."""
     goal, outcome, names = problem.goal, nearest.outcome, nearest.names
     robustness, figures = outcome["robustness"], outcome["figures"]
     if outcome["excess"] <= 1.0:
         worst = max(nearest.kept, key=lambda one: one.share)
-        return (
+        return ParameterError(
             f"margins: the search found no gains whose exact margins are as asked for; the nearest "
-            f"have {worst}: expected a milder margin, more particles or more iterations"
+            f"have {worst}: expected a milder margin, more particles or more iterations",
+            argument="margins",
         )
     if robustness[0][0] > 0.0:
-        return (
+        return ParameterError(
             f"models: no gains in the search make all {len(names)} plants stable, the nearest "
             f"leave {names[robustness[0][1]]} unstable: expected a smaller spread, or plants "
-            "nearer to each other"
+            "nearer to each other",
+            argument="models",
         )
     if not figures:
         shorts = _shorts(problem, robustness)
-        return max(shorts, key=lambda one: one.factor).sentence(names)
+        return max(shorts, key=lambda one: one.factor).refusal(names)
     fastest, share = max(one[3] for one in figures), max(one[4] for one in figures)
     if fastest > goal.slew:
-        return (
-            f"slew is {goal.slew:.4g} V/s: expected {fastest:.4g} V/s, which the slowest "
-            "controller needs along these references"
+        return ParameterError(
+            "slew",
+            f"{goal.slew:.4g} V/s",
+            f"{fastest:.4g} V/s, which the slowest controller needs along these references",
         )
     error = math.sqrt(sum(one[0] ** 2 for one in figures) / len(figures))
     if error > goal.largest_error:
-        return (
-            f"largest_error is {1e6 * goal.largest_error:.4g} um: expected {1e6 * error:.4g} um or "
-            "more, the least rms error that was found along these references"
+        return ParameterError(
+            "largest_error",
+            f"{1e6 * goal.largest_error:.4g} um",
+            f"{1e6 * error:.4g} um or more, the least rms error that was found along these "
+            "references",
         )
-    return (
-        f"largest_saturation is {goal.largest_saturation:.3g}: expected {share:.3g} at least, the "
-        "share of the samples at which every controller is clipped along these references"
+    return ParameterError(
+        "largest_saturation",
+        f"{goal.largest_saturation:.3g}",
+        f"{share:.3g} at least, the share of the samples at which every controller is clipped "
+        "along these references",
     )
 
 

@@ -230,7 +230,7 @@ def schedule(
     both = isinstance(stage, XYStage)
     make: Any = _waveform(both, centre) if waveform is None else waveform
     if not callable(make):
-        raise ParameterError(f"waveform is {quoted(waveform)}: expected a function")
+        raise ParameterError("waveform", quoted(waveform), "a function")
     nothing = Pid(kp=1.0, ti=1.0)
     # The grid is checked before anything is searched.
     grid = ScheduledPid(
@@ -238,7 +238,7 @@ def schedule(
     )
     parts = options.pop("parts", ("pid", "low-pass"))
     if "repetitive" in (parts or ()):
-        raise ParameterError("parts has 'repetitive': expected none, its period is of one rate")
+        raise ParameterError("parts", "'repetitive'", "none, its period is of one rate", verb="has")
     pairs = [(amplitude, rate) for amplitude in grid.amplitudes for rate in grid.rates]
     references = [make(amplitude, rate) for amplitude, rate in pairs]
     common: dict[str, Any] = {**options}
@@ -317,7 +317,7 @@ def _waveform(both: bool, centre: Any) -> Any:
         middle = {} if centre is None else {"centre": centre}
         return lambda radius, rate: circle(frequency=rate, radius=radius, **middle)
     if centre is None:
-        raise ParameterError("centre is missing: expected the middle of the references in m")
+        raise ParameterError("centre", "missing", "the middle of the references in m")
     return _sines(centre)
 
 
@@ -352,7 +352,8 @@ def _check_between(controller: Controller, plants: list[_core.LoopPlant], margin
                 raise ParameterError(
                     "amplitudes and rates: gains half-way between two places of the grid have a "
                     f"sensitivity of {check['sensitivity']:.3g}: expected at most "
-                    f"{margins.sensitivity:.3g}; take a finer grid or a smaller margin"
+                    f"{margins.sensitivity:.3g}; take a finer grid or a smaller margin",
+                    argument="amplitudes",
                 )
 
 

@@ -140,13 +140,13 @@ def _axis_search(problem: TuningProblem, axis: Axis, dt: float) -> AxisSearch:
     of_parts = sum(one in parts for one in ("low-pass", "notch"))
     if len(axis.filters) + of_parts > 2:
         raise ParameterError(
-            f"filters has {len(axis.filters)} beside {of_parts} of the parts: expected 2 in all"
+            "filters", f"{len(axis.filters)} beside {of_parts} of the parts", "2 in all", verb="has"
         )
     periods = {one.period for one in problem.references}
     if "repetitive" in parts and len(periods) > 1:
         listed = ", ".join(f"{one:g} s" if one else "none" for one in sorted(periods, key=str))
         raise ParameterError(
-            f"references have periods of {listed}: expected one period for the repetitive part"
+            "references", f"periods of {listed}", "one period for the repetitive part", verb="have"
         )
     period = next(iter(periods), None)
     base = Controller(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
-from ...errors import ParameterError
 from ..loop.contouring import contour
 from ..running.track import track
 from .goal import MINIMISED
@@ -164,7 +163,7 @@ def tune(
     solutions = [search_at(problem, interval) for interval in problem.intervals]
     best = min(solutions, key=_rank)
     if not best.feasible:
-        raise ParameterError(refusal(problem, best))
+        raise refusal(problem, best)
     return _simulated(problem, best, solutions)
 
 

@@ -76,7 +76,7 @@ class Source:
         try:
             self.path = Path(path)
         except TypeError:
-            raise ParameterError(f"path is {quoted(path)}: expected the name of a file") from None
+            raise ParameterError("path", quoted(path), "the name of a file") from None
         self.name = self.path.name or str(self.path)
         with self._opening():
             if self.path.is_dir():
@@ -111,7 +111,7 @@ class Source:
         except DataError as error:
             raise self.error(str(error), line) from None
         except (ParameterError, ShapeError) as error:
-            raise type(error)(f"{self.name}: {error}") from None
+            raise error.of(self.name) from None
 
     @contextmanager
     def decoding(self, kind: str, logger: str | None = None) -> Iterator[None]:

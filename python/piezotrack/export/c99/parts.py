@@ -86,23 +86,25 @@ def feedforward_table(
     """
     if given is not None:
         if reference is not None:
-            raise ParameterError("reference is given beside table: expected one of them")
+            raise ParameterError("reference", "given beside table", "one of them")
         return _given_table(controller, given)
     if reference is None:
         return None
     if controller.feedforward is None:
-        raise ParameterError(
-            "reference is given, but the controller has no feedforward: expected none"
-        )
+        raise ParameterError("reference", "given, but the controller has no feedforward", "none")
     if reference.period is None:
         raise ParameterError(
-            f"reference ({reference.name}) does not repeat: expected one that does, for its table"
+            "reference",
+            f"({reference.name}), which does not repeat",
+            "one that does, for its table",
         )
     samples = reference.period / controller.dt
     if abs(samples - round(samples)) > 1e-6:
         raise ParameterError(
-            f"reference ({reference.name}) has a period of {reference.period:g} s: expected a "
-            f"whole number of samples of {controller.dt:g} s, for its table"
+            f"reference ({reference.name})",
+            f"a period of {reference.period:g} s",
+            f"a whole number of samples of {controller.dt:g} s, for its table",
+            verb="has",
         )
     check_period(controller, reference)
     table = controller.feedforward.table(reference, controller.dt, limits=controller.limits)
@@ -114,7 +116,7 @@ def _given_table(controller: Controller, given: ArrayLike) -> list[float]:
     table = signal_of("table", given)
     low, high = controller.limits
     if not 1 <= table.size <= MOST_SAMPLES:
-        raise ShapeError(f"table has {table.size} samples: expected 1 to {MOST_SAMPLES}")
+        raise ShapeError("table", f"{table.size} samples", f"1 to {MOST_SAMPLES}")
     far = np.flatnonzero((table < low) | (table > high))
     if far.size:
         unit = controller.drive_unit
@@ -164,9 +166,10 @@ def _law_of(controller: Controller) -> tuple[str, tuple[str, ...]]:
     if (stage := getattr(law, "stage", None)) is not None:
         what += f" of a {stage.info.title} stage"
     raise ParameterError(
-        f"feedback is a {what}, which has no form in C: its step needs powers or logarithms; "
-        "expected a PID, state space, lead-lag, sliding mode, a disturbance observer or the "
-        "hysteresis observer of a Dahl stage, or to='library', which has all"
+        "feedback",
+        f"a {what}, which has no form in C, as its step needs powers or logarithms",
+        "a PID, state space, lead-lag, sliding mode, a disturbance observer or the "
+        "hysteresis observer of a Dahl stage, or to='library', which has all",
     )
 
 
@@ -182,9 +185,10 @@ def _check_online(controller: Controller) -> None:
     else:
         return
     raise ParameterError(
-        f"feedforward is {what}, which has no form in C sample by sample: expected "
-        "reference=, a motion that repeats, whose table is written, a Dahl stage without creep, or "
-        "to='library', which has all"
+        "feedforward",
+        f"{what}, which has no form in C sample by sample",
+        "reference=, a motion that repeats, whose table is written, a Dahl stage without "
+        "creep, or to='library', which has all",
     )
 
 

@@ -75,15 +75,15 @@ def checked_name(name: str) -> str:
     expect("name", name, str, "a text")
     if name in INSIDE:
         raise ParameterError(
-            f"name is {name!r}, as functions inside of the C file begin: expected another name"
+            "name", f"{name!r}, as functions inside of the C file begin", "another name"
         )
     if name in BESIDE:
         raise ParameterError(
-            f"name is {name!r}, as a file or function beside the controller: expected another name"
+            "name", f"{name!r}, as a file or function beside the controller", "another name"
         )
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,39}", name):
         raise ParameterError(
-            f"name is {name!r}: expected a letter, then letters, digits or underscores, 40 at most"
+            "name", f"{name!r}", "a letter, then letters, digits or underscores, 40 at most"
         )
     return name
 

@@ -163,13 +163,13 @@ def literal(value: float, name: str, *, single: bool) -> str:
     """
     value = float(value)
     if not math.isfinite(value):
-        raise ParameterError(f"{name} is {value}: expected a finite number")
+        raise ParameterError(name, value, "a finite number")
     if not single:
         return f"{_short(value)} /* {value!r} */"
     with np.errstate(over="ignore", under="ignore"):
         rounded = float(np.float32(value))
     if not math.isfinite(rounded) or (rounded == 0.0) != (value == 0.0):
-        raise ParameterError(f"{name} is {value:g}: expected a number that a float can have")
+        raise ParameterError(name, f"{value:g}", "a number that a float can have")
     return f"{_short(rounded)}f /* {value!r} */"
 
 

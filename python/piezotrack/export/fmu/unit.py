@@ -82,13 +82,15 @@ def compiler() -> list[str]:
     if (system, machine) != ("Linux", "x86_64"):
         raise ParameterError(
             f"a unit has a binary for Linux, x86-64, which is not compiled on {system}, {machine}: "
-            "expected to='c99', whose sources every machine compiles"
+            "expected to='c99', whose sources every machine compiles",
+            argument="to",
         )
     asked = os.environ.get("CC", "").split()
     if asked and shutil.which(asked[0]) is None:
         raise ParameterError(
-            f"CC is {quoted(asked[0])}, which cannot be run: expected the name of a C compiler, or "
-            "no CC in the environment"
+            "CC",
+            f"{quoted(asked[0])}, which cannot be run",
+            "the name of a C compiler, or no CC in the environment",
         )
     if asked:
         return asked
@@ -97,7 +99,8 @@ def compiler() -> list[str]:
             return [found]
     raise ParameterError(
         "no C compiler was found for the binary of the unit: expected gcc, cc or clang, or CC= in "
-        "the environment"
+        "the environment",
+        argument="to",
     )
 
 

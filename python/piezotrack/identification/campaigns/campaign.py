@@ -114,7 +114,7 @@ def campaign(
             else "ProcessPoolExecutor(4)"
         )
         raise ParameterError(
-            f"executor is {quoted(executor)}: expected a concurrent.futures.Executor, as {hint}"
+            "executor", quoted(executor), f"a concurrent.futures.Executor, as {hint}"
         )
     place = CampaignFolder(folder)
     place.begin({record_hash(data): (title, data) for title, data in named.items()}, of_models)
@@ -153,19 +153,21 @@ def campaign(
 def _records(records: object) -> dict[str, Dataset]:
     """Check the records, and give each a title."""
     if isinstance(records, Dataset) or not has_entries(records):
-        raise ParameterError(f"records is {quoted(records)}: expected Datasets in a list, as [log]")
+        raise ParameterError("records", quoted(records), "Datasets in a list, as [log]")
     if isinstance(records, Mapping):
         pairs = [(str(title), data) for title, data in records.items()]
     else:
         pairs = [("", data) for data in records]
     if not pairs:
-        raise ParameterError("records is empty: expected one Dataset or more")
+        raise ParameterError("records", "empty", "one Dataset or more")
     for title, data in pairs:
         if not isinstance(data, Dataset):
             of = f" under '{title}'" if title else ""
             raise ParameterError(
-                f"records has {quoted(data)}{of}: expected Datasets, as pt.read or "
-                "pt.Dataset.from_frame make them"
+                "records",
+                f"{quoted(data)}{of}",
+                "Datasets, as pt.read or pt.Dataset.from_frame make them",
+                verb="has",
             )
     named: dict[str, Dataset] = {}
     keys: dict[str, str] = {}
@@ -175,8 +177,10 @@ def _records(records: object) -> dict[str, Dataset]:
         title = given or _title(data, key, alone=sources.count(data.source) == 1)
         if key in keys:
             raise ParameterError(
-                f"records has the same samples twice, as '{keys[key]}' and '{title}': expected "
-                "them once"
+                "records",
+                f"the same samples twice, as '{keys[key]}' and '{title}'",
+                "them once",
+                verb="has",
             )
         # Two records of one name and window, from two folders.
         title = title if title not in named else f"{title} {key[:6]}"
@@ -194,7 +198,7 @@ def _title(data: Dataset, key: str, *, alone: bool) -> str:
 def _models(models: object) -> dict[str, object]:
     """Check the models: arguments of `identify` by title."""
     if not has_entries(models):
-        raise ParameterError(f"models is {quoted(models)}: expected several in a list, as ['dahl']")
+        raise ParameterError("models", quoted(models), "several in a list, as ['dahl']")
     if isinstance(models, Mapping):
         named = {str(title): given for title, given in models.items()}
     else:
@@ -202,14 +206,16 @@ def _models(models: object) -> dict[str, object]:
         for name in models:
             if not isinstance(name, str):
                 raise ParameterError(
-                    f"models has {quoted(name)}: expected names of models, or a mapping of titles "
-                    "to arguments of identify"
+                    "models",
+                    quoted(name),
+                    "names of models, or a mapping of titles to arguments of identify",
+                    verb="has",
                 )
             if name in named:
-                raise ParameterError(f"models has '{name}' twice: expected it once")
+                raise ParameterError("models", f"'{name}' twice", "it once", verb="has")
             named[name] = {"model": name}
     if not named:
-        raise ParameterError("models is empty: expected one or more")
+        raise ParameterError("models", "empty", "one or more")
     return named
 
 
@@ -219,19 +225,20 @@ def _refuse_alike(models: Mapping[str, dict[str, Any]]) -> None:
     for i, title in enumerate(titles):
         if alike := [one for one in titles[:i] if models[one] == models[title]]:
             raise ParameterError(
-                f"models has the same settings as '{alike[0]}' and as '{title}': expected them once"
+                "models",
+                f"the same settings as '{alike[0]}' and as '{title}'",
+                "them once",
+                verb="has",
             )
 
 
 def _seeds(seeds: object) -> list[int]:
     """Check the seeds."""
     if not has_entries(seeds):
-        raise ParameterError(
-            f"seeds is {quoted(seeds)}: expected several in a list, as [0, 1] or range(10)"
-        )
+        raise ParameterError("seeds", quoted(seeds), "several in a list, as [0, 1] or range(10)")
     found = [_core.as_count("seeds", seed) for seed in seeds]
     if not found:
-        raise ParameterError("seeds is empty: expected one or more")
+        raise ParameterError("seeds", "empty", "one or more")
     if twice := [seed for i, seed in enumerate(found) if seed in found[:i]]:
-        raise ParameterError(f"seeds has {twice[0]} twice: expected it once")
+        raise ParameterError("seeds", f"{twice[0]} twice", "it once", verb="has")
     return found

@@ -44,7 +44,7 @@ class CampaignFolder:
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         if not isinstance(folder, (str, os.PathLike)) or not os.fspath(folder):
-            raise ParameterError(f"folder is {quoted(folder)}: expected the name of a folder")
+            raise ParameterError("folder", quoted(folder), "the name of a folder")
         self.path = Path(folder)
         self.document = self._document()
 

@@ -172,14 +172,17 @@ def problem_of(title: str, given: object, data: Dataset) -> tuple[Problem, Metho
     """
     if not isinstance(given, Mapping):
         raise ParameterError(
-            f"models: '{title}' is {quoted(given)}: expected arguments of identify, as "
-            "{'model': 'dahl', 'history': 'virgin'}"
+            f"models['{title}']",
+            quoted(given),
+            "arguments of identify, as {'model': 'dahl', 'history': 'virgin'}",
         )
     for name in given:
         if name in ELSEWHERE:
-            raise ParameterError(f"models: '{title}' has {name}: {ELSEWHERE[name]}")
+            raise ParameterError(
+                f"models: '{title}' has {name}: {ELSEWHERE[name]}", argument="models"
+            )
         if name not in GIVEN:
-            raise ParameterError(f"models: '{title}' has {quoted(name)}: expected {listed(GIVEN)}")
+            raise ParameterError(f"models['{title}']", quoted(name), listed(GIVEN), verb="has")
     model = given.get("model") or title
     of_record = {"offset": True, **dict.fromkeys(OF_RECORD[1:])}
     of_record |= {name: given[name] for name in OF_RECORD if given.get(name) is not None}
@@ -190,9 +193,8 @@ def problem_of(title: str, given: object, data: Dataset) -> tuple[Problem, Metho
         methods = MethodChoice.of(given.get("method"), None if model == AUTO else problem.info)
         if methods.search.seed:
             raise ParameterError(
-                f"method has the seed {methods.search.seed}: expected it in seeds=",
-                argument="method",
+                "method", f"the seed {methods.search.seed}", "it in seeds=", verb="has"
             )
     except ParameterError as error:
-        raise ParameterError(f"models: '{title}': {error}", argument="models") from None
+        raise error.of(f"models: '{title}'", argument="models") from None
     return problem, methods

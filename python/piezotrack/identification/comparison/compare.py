@@ -278,8 +278,7 @@ def compare(
     >>> found.best.name, found.train.duration, found.test.duration
     ('prandtl-ishlinskii', 10.0, 10.0)
     """
-    if not isinstance(data, Dataset):
-        raise ParameterError(f"data is {type(data).__name__}: expected a Dataset, see pt.read")
+    expect("data", data, Dataset, "a Dataset, see pt.read")
     wanted = _wanted(models, data.drive_unit)
     first, second, carried = parts_of(data, train, test)
     method = (Descents(seed=seed, runs=runs), LeastSquares())
@@ -327,10 +326,10 @@ def _wanted(models: object, drive_unit: str) -> list[tuple[str, str, ModelInfo |
         suited = [info for info in MODELS if info.drive_unit in ("V", drive_unit)]
         return [(info.name, info.title, info) for info in suited]
     if isinstance(models, Mapping) or not has_entries(models):
-        raise ParameterError(f"models is {models!r}: expected several in a list, as ['dahl']")
+        raise ParameterError("models", f"{models!r}", "several in a list, as ['dahl']")
     sources = [_source(model) for model in models]
     if not sources:
-        raise ParameterError("models is empty: expected one or more")
+        raise ParameterError("models", "empty", "one or more")
     # Names of files come first, so that a model saved beside them does not take their place.
     taken = {"comparison"}
     names: dict[int, str] = {}
@@ -376,10 +375,13 @@ def _source(model: object) -> tuple[str | None, ModelInfo | IdentifiedModel]:
             model_named(str(model))
         except ParameterError as error:
             words = str(error).removeprefix("model is ")
-            raise ParameterError(f"models has {words}; or the JSON file of a model") from None
+            words = f"models has {words}; or the JSON file of a model"
+            raise ParameterError(words, argument="models") from None
     raise ParameterError(
-        f"models has '{type(model).__name__}': expected names of models, JSON files of models, or "
-        "identified models"
+        "models",
+        f"'{type(model).__name__}'",
+        "names of models, JSON files of models, or identified models",
+        verb="has",
     )
 
 

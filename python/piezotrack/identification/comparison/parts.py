@@ -46,15 +46,19 @@ def parts_of(log: Dataset, train: object, test: object) -> tuple[Dataset, Datase
     elif train is None:
         if second[0] is None:
             raise ParameterError(
-                "test begins with the record, which leaves nothing to fit: expected a later "
-                "beginning, or train="
+                "test",
+                "the record, which leaves nothing to fit",
+                "a later beginning, or train=",
+                verb="begins with",
             )
         first = (None, second[0])
     elif test is None:
         if first[1] is None:
             raise ParameterError(
-                "train goes to the end of the record, which leaves nothing to validate on: "
-                "expected an end, or test="
+                "train",
+                "to the end of the record, which leaves nothing to validate on",
+                "an end, or test=",
+                verb="goes",
             )
         second = (first[1], None)
     one, two = _windowed("train", log, first), _windowed("test", log, second)
@@ -69,8 +73,11 @@ def _check_apart(train: Dataset, test: Dataset) -> None:
     if not shared[0].any() or not np.array_equal(train.y[shared[0]], test.y[shared[1]]):
         return
     raise ParameterError(
-        f"test goes from {test.t[0]:.6g} to {test.t[-1]:.6g} s and train from {train.t[0]:.6g} to "
-        f"{train.t[-1]:.6g} s: expected windows that do not overlap"
+        "test",
+        f"from {test.t[0]:.6g} to {test.t[-1]:.6g} s and train from {train.t[0]:.6g} to "
+        f"{train.t[-1]:.6g} s",
+        "windows that do not overlap",
+        verb="goes",
     )
 
 
@@ -82,7 +89,7 @@ def _bounds(name: str, window: object) -> Window:
     if len(ends) != 2:
         what = f"{window!r}" if isinstance(window, (tuple, list, str)) else type(window).__name__
         other = " or a Dataset" if name == "test" else ""
-        raise ParameterError(f"{name} is {what}: expected (start, stop) in seconds{other}")
+        raise ParameterError(name, what, f"(start, stop) in seconds{other}")
     return ends[0], ends[1]
 
 
@@ -90,4 +97,4 @@ def _windowed(name: str, log: Dataset, window: Window) -> Dataset:
     try:
         return log if window == (None, None) else log[window[0] : window[1]]
     except ParameterError as error:
-        raise ParameterError(f"{name}: {error}") from None
+        raise error.of(name, argument=name) from None

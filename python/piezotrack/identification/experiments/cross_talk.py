@@ -96,9 +96,7 @@ def identify_cross_talk(x_driven: Sequence[Dataset], y_driven: Sequence[Dataset]
         given = isinstance(logs, (tuple, list))
         pair = [log for log in logs if isinstance(log, Dataset)] if given else []
         if len(pair) != 2 or len(logs) != 2:
-            raise ParameterError(
-                f"{name} is {quoted(logs)}: expected the two pt.Dataset of x and y"
-            )
+            raise ParameterError(name, quoted(logs), "the two pt.Dataset of x and y")
         other = 1 - driven
         moving, still = float(np.ptp(pair[driven].u)), float(np.ptp(pair[other].u))
         if still > HELD * moving:

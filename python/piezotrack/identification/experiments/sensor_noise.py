@@ -15,7 +15,7 @@ from ..._support.display.result import Result
 from ..._support.files.writing import make_folder, result_set, save_figures, write_document
 from ..._support.statistics import ErrorStatistics
 from ...data.dataset import Dataset
-from ...errors import DataError, ParameterError
+from ...errors import DataError
 from ...stages.virtual import VirtualStage
 
 if TYPE_CHECKING:
@@ -238,8 +238,7 @@ def identify_noise(log: Dataset) -> Noise:
     >>> print(f"{1e6 * found.rms:.3f} um rms in steps of {1e6 * found.resolution:.3f} um")
     0.097 um rms in steps of 0.038 um
     """
-    if not isinstance(log, Dataset):
-        raise ParameterError(f"log is {type(log).__name__}: expected pt.Dataset")
+    expect("log", log, Dataset, "pt.Dataset")
     if np.ptp(log.u) > 0.0 and np.ptp(log.y) > 0.0:
         alike = float(np.corrcoef(log.u, log.y)[0, 1])
         if abs(alike) > FOLLOWS:

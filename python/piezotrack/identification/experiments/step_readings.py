@@ -76,9 +76,7 @@ class StepReadings:
         try:
             values = list(self.peaks)
         except TypeError:
-            raise ParameterError(
-                f"peaks is {quoted(self.peaks)}: expected several numbers"
-            ) from None
+            raise ParameterError("peaks", quoted(self.peaks), "several numbers") from None
         peaks = tuple(_core.as_number(f"peaks[{k}]", value) for k, value in enumerate(values))
         object.__setattr__(self, "peaks", peaks)
         _ = self._core

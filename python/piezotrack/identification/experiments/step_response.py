@@ -441,11 +441,11 @@ def identify_step(
         readings, trace = _read(data)
     else:
         kind = type(data).__name__
-        raise ParameterError(f"data is {kind}: expected a Dataset, see pt.read, or a StepReadings")
+        raise ParameterError("data", kind, "a Dataset, see pt.read, or a StepReadings")
     given = {"stiffness": stiffness, "mass": mass, "second_level": second_level}
     named = [name for name, value in given.items() if value is not None]
     if len(named) > 1:
-        raise ParameterError(f"{' and '.join(named)} are given: expected one, it fixes the scale")
+        raise ParameterError(" and ".join(named), "given", "one, it fixes the scale", verb="are")
     core = readings._core
     wn, zeta = core.mode()[4], core.mode()[2]
     level = (readings.voltage, readings.steady_state)
@@ -514,8 +514,9 @@ def _level(second: object) -> tuple[float, float]:
         return second.readings.voltage, second.readings.steady_state
     if not isinstance(second, (tuple, list)) or len(second) != 2:
         raise ParameterError(
-            f"second_level is {quoted(second)}: expected (voltage in V, displacement in m) or the "
-            "StepResult of another step"
+            "second_level",
+            quoted(second),
+            "(voltage in V, displacement in m) or the StepResult of another step",
         )
     voltage, displacement = second
     return (
@@ -527,5 +528,5 @@ def _level(second: object) -> tuple[float, float]:
 def _positive(name: str, value: object, unit: str) -> float:
     number = _core.as_number(name, value)
     if not 0.0 < number < math.inf:
-        raise ParameterError(f"{name} is {number:g} {unit}: expected a finite number above 0")
+        raise ParameterError(name, f"{number:g} {unit}", "a finite number above 0")
     return number

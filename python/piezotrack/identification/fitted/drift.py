@@ -149,7 +149,7 @@ def time_constant(name: str, value: object) -> float:
     """Check the time constant of a drift [s]."""
     time = positive(name, value, "s")
     if time < SHORTEST:
-        raise ParameterError(f"{name} is {time:g} s: expected {SHORTEST:g} s or more")
+        raise ParameterError(name, f"{time:g} s", f"{SHORTEST:g} s or more")
     return time
 
 
@@ -206,13 +206,12 @@ def drift_of(entry: Any) -> Drift | None:
     time = object_of("drift: time", found["time"])
     for name, most in (("amplitude", LARGEST), ("begin", LATEST), ("end", LATEST)):
         if not abs(values[name]) < most:
-            raise ParameterError(
-                f"drift: {name} is {values[name]:g}: expected a number below {most:g}"
-            )
+            raise ParameterError(f"drift: {name}", f"{values[name]:g}", f"a number below {most:g}")
     if values["begin"] > values["end"]:
         raise ParameterError(
-            f"drift: end is {values['end']:g} s: expected no instant before its begin, "
-            f"{values['begin']:g} s"
+            "drift: end",
+            f"{values['end']:g} s",
+            f"no instant before its begin, {values['begin']:g} s",
         )
     return Drift(
         time=time_constant("drift: time", time["value"]),

@@ -154,7 +154,7 @@ def records_of_file(entries: Any, state: type[StageState]) -> tuple[FittedRecord
     if entries is None:
         return ()
     if not isinstance(entries, list):
-        raise ParameterError(f"records is {type(entries).__name__}: expected a list of records")
+        raise ParameterError("records", type(entries).__name__, "a list of records")
     return tuple(_record(f"records[{i}]", one, state) for i, one in enumerate(entries))
 
 
@@ -165,7 +165,7 @@ def _record(name: str, entry: Any, state: type[StageState]) -> FittedRecord:
         value = found[key]
         if value.get("unit") != unit:
             raise ParameterError(
-                f"the unit of {name}: {key} is {value.get('unit')!r}: expected {unit!r}"
+                f"the unit of {name}: {key}", f"{value.get('unit')!r}", f"{unit!r}"
             )
         return _core.as_number(f"{name}: {key}", value["value"])
 

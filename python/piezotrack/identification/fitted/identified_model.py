@@ -181,7 +181,7 @@ class IdentifiedModel(Result):
         drive = signal_of("u", u)
         interval = None if dt is None else check_dt(dt)
         if not drive.size:
-            raise ShapeError("u has no samples: expected at least one")
+            raise ShapeError("u", "no samples", "at least one")
         most = float(max(rates)) if rates else None
         return extrapolation_notes(drive, interval, self.drive_range, most, self.drive_unit)
 
@@ -321,8 +321,10 @@ class IdentifiedModel(Result):
         expect("data", data, Dataset, "a Dataset")
         if data.drive_unit != (unit := self.drive_unit) and "m" in (unit, data.drive_unit):
             raise ParameterError(
-                f"the drive of the record is in {data.drive_unit}: expected {unit}, as that of the "
-                "record identified"
+                "data",
+                f"a drive in {data.drive_unit}",
+                f"{unit}, as that of the record identified",
+                verb="has",
             )
         state = self._begins(data, history, initial)
         start = data.warmup
@@ -433,7 +435,7 @@ class IdentifiedModel(Result):
             return self.start_on(data, history=history).state
         if history is not None:
             raise ParameterError(
-                f"history is {history!r} beside an initial state: expected one of the two"
+                "history", f"{history!r} beside an initial state", "one of the two"
             )
         return initial
 
@@ -442,7 +444,7 @@ class IdentifiedModel(Result):
         if not (isinstance(offset, str) and offset == "own"):
             shift = _core.as_number("offset", offset)
             if not abs(shift) < LARGEST:
-                raise ParameterError(f"offset is {shift}: expected 'own', or m below {LARGEST:g}")
+                raise ParameterError("offset", shift, f"'own', or m below {LARGEST:g}")
             return shift
         return float(np.mean(data.y - x)) if self._fits_offset(data) else 0.0
 

@@ -186,5 +186,5 @@ def sensor_number(name: str, value: object) -> float:
     unit, fits, expected = SENSOR[name]
     number = _core.as_number(name, value)
     if not (math.isfinite(number) and fits(number)):
-        raise ParameterError(f"{name} is {number} {unit}: expected {expected}")
+        raise ParameterError(name, f"{number} {unit}", expected)
     return number

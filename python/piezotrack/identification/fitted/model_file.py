@@ -249,7 +249,7 @@ def read_content(path: str | os.PathLike[str]) -> tuple[str, Any]:
     try:
         file = Path(path)
     except TypeError:
-        raise ParameterError(f"path is {path!r}: expected the name of a file") from None
+        raise ParameterError("path", f"{path!r}", "the name of a file") from None
     try:
         content = file.read_bytes()
     except OSError as error:
@@ -275,7 +275,7 @@ def entries_of(name: str) -> Iterator[None]:
 def require_unit(name: str, entry: Mapping[str, Any], unit: str) -> None:
     """Refuse an entry that is in another unit than the one that is written."""
     if entry.get("unit") != unit:
-        raise ParameterError(f"the unit of {name} is {entry.get('unit')!r}: expected {unit!r}")
+        raise ParameterError(f"the unit of {name}", f"{entry.get('unit')!r}", f"{unit!r}")
 
 
 def file_number(name: str, entry: Mapping[str, Any]) -> float:

@@ -95,8 +95,7 @@ def checked_history(history: object) -> History | None:
     if history is None or (isinstance(history, str) and history in get_args(History)):
         return history  # type: ignore[return-value]
     raise ParameterError(
-        f"history is {quoted(history)}: expected 'virgin', 'settled', 'fit', or None for what the "
-        "record shows"
+        "history", quoted(history), "'virgin', 'settled', 'fit', or None for what the record shows"
     )
 
 
@@ -160,7 +159,7 @@ def state_of(place: str, entry: Any, state: type[StageState]) -> StageState:
     }
     known = {one.name for one in fields(state)}
     if extra := set(numbers) - known:
-        raise ParameterError(f"{place} has {quoted(min(extra))}: expected {sorted(known)}")
+        raise ParameterError(place, quoted(min(extra)), f"{sorted(known)}", verb="has")
     return state(**numbers)
 
 
@@ -190,7 +189,7 @@ def start_of(entry: Any, state: type[StageState]) -> Start | None:
     begun = state_of("start: state", found["state"], state)
     history = checked_history(found["history"])
     if history is None:
-        raise ParameterError("start: history is None: expected 'virgin', 'settled' or 'fit'")
+        raise ParameterError("start: history", "None", "'virgin', 'settled' or 'fit'")
     volts = found["voltage"]["value"]
     return Start(
         history=history,

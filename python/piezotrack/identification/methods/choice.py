@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["MethodChoice"]
 
 SEARCHES = {one.name: one for one in (Descents, ParticleSwarm)}
-EXPECTED = "expected 'descents', 'swarm', pt.Descents, pt.ParticleSwarm or pt.LeastSquares"
+EXPECTED = "'descents', 'swarm', pt.Descents, pt.ParticleSwarm or pt.LeastSquares"
 # The descent finds the bottom: swarms that only have to find the basin can be short, and those
 # that only have to tell the models apart few.
 ITERATIONS, RUNS = 40, 2
@@ -69,16 +69,15 @@ class MethodChoice:
             place = "weights" if isinstance(checked, LeastSquares) else "search"
             if place in found:
                 raise ParameterError(
-                    f"method is {quoted(method)}: expected one that searches, and one LeastSquares",
-                    argument="method",
+                    "method", quoted(method), "one that searches, and one LeastSquares"
                 )
             found[place] = checked
         if found and info is not None and ("search" if info.searched else "weights") not in found:
             how = "are searched" if info.searched else "follow by least squares"
             raise ParameterError(
-                f"method is {quoted(method)}: expected another one with the model '{info.name}', "
-                f"whose parameters {how}",
-                argument="method",
+                "method",
+                quoted(method),
+                f"another one with the model '{info.name}', whose parameters {how}",
             )
         return cls(**found)
 
@@ -118,7 +117,7 @@ def _named(method: object, *, any_model: bool) -> Method:
     if isinstance(method, (Descents, ParticleSwarm, LeastSquares)):
         return method
     if not isinstance(method, str) or method not in SEARCHES:
-        raise ParameterError(f"method is {quoted(method)}: {EXPECTED}", argument="method")
+        raise ParameterError("method", quoted(method), EXPECTED)
     if any_model and method == ParticleSwarm.name:
         return ParticleSwarm(iterations=ITERATIONS)
     return SEARCHES[method]()

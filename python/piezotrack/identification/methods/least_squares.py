@@ -86,7 +86,7 @@ class LeastSquares:
         if self.count is not None:
             count = _core.as_count("count", self.count)
             if not 1 <= count <= MOST_PLAYS:
-                raise ParameterError(f"count is {count}: expected 1 to {MOST_PLAYS} plays")
+                raise ParameterError("count", count, f"1 to {MOST_PLAYS} plays")
         if self.thresholds is not None:
             object.__setattr__(self, "thresholds", as_numbers("thresholds", self.thresholds))
         if self.levels is not None:
@@ -94,14 +94,12 @@ class LeastSquares:
         if not isinstance(self.dead_zones, bool):
             zones = _core.as_count("dead_zones", self.dead_zones)
             if zones > MOST_ZONES:
-                raise ParameterError(
-                    f"dead_zones is {zones}: expected up to {MOST_ZONES} dead zones"
-                )
+                raise ParameterError("dead_zones", zones, f"up to {MOST_ZONES} dead zones")
         if not isinstance(self.creep, bool) and self.creep != "auto":
             object.__setattr__(self, "creep", as_numbers("creep", self.creep))
         if self.dynamics not in (None, "auto", "first", "second"):
             raise ParameterError(
-                f"dynamics is {quoted(self.dynamics)}: expected 'auto', None, 'first' or 'second'"
+                "dynamics", quoted(self.dynamics), "'auto', None, 'first' or 'second'"
             )
 
     def settings(self) -> dict[str, Any]:

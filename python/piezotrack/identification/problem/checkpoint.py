@@ -52,9 +52,7 @@ def checkpoint_of(
         yield None
         return
     if not isinstance(path, (str, os.PathLike)) or not os.fspath(path):
-        raise ParameterError(
-            f"checkpoint is {quoted(path)}: expected the name of a file", argument="checkpoint"
-        )
+        raise ParameterError("checkpoint", quoted(path), "the name of a file")
     # All that the result depends on.
     content = [*problem.content(), methods.settings(), _core.__version__]
     identity = hash_of(exact_text(content))

@@ -77,7 +77,7 @@ def as_plain_data(name: str, value: Any) -> Any:
         return sorted(as_plain_data(name, entry) for entry in value)
     if has_entries(value):
         return [as_plain_data(name, entry) for entry in value]
-    raise ParameterError(f"{name} is {quoted(value)}: expected numbers, texts, lists or mappings")
+    raise ParameterError(name, quoted(value), "numbers, texts, lists or mappings")
 
 
 def exact_text(value: Any) -> Any:

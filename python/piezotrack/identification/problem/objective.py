@@ -78,9 +78,7 @@ class Objective:
     ) -> None:
         records = records_of(data, offset=offset, delay=delay, drift=drift, history=history)
         if not model_named(model).searched:
-            raise ParameterError(
-                f"model is {model!r}: expected one that is searched", argument="model"
-            )
+            raise ParameterError("model", f"{model!r}", "one that is searched")
         self._enter(
             Problem.checked(model, records, parameters, constraints, creep),
             0 if threads is None else _core.as_count("threads", threads),
@@ -197,7 +195,10 @@ def _rows(places: ArrayLike) -> list[list[float]]:
     rows = np.atleast_2d(np.asarray(places, dtype=np.float64))
     if rows.ndim > 2:
         raise ParameterError(
-            f"places have {rows.ndim} dimensions: expected one row of coordinates for each place"
+            "places",
+            f"{rows.ndim} dimensions",
+            "one row of coordinates for each place",
+            verb="have",
         )
     listed: list[list[float]] = rows.tolist()
     return listed

@@ -70,9 +70,7 @@ class Parameter:
             if (text := getattr(self, name)) is None:
                 continue
             if not isinstance(text, str):
-                raise ParameterError(
-                    f"{name} is {quoted(text)}: expected a text, as {example}", argument=name
-                )
+                raise ParameterError(name, quoted(text), f"a text, as {example}")
             self._set(name, plain_text(text))
 
     def _set(self, name: str, value: object) -> None:
@@ -105,9 +103,9 @@ def parameters_of(given: object) -> dict[str, Parameter]:
         return {}
     if not isinstance(given, Mapping):
         raise ParameterError(
-            f"parameters is {quoted(given)}: expected a mapping of names to values, bounds, ties "
-            "or pt.Parameter, as {'mass': 0.18}",
-            argument="parameters",
+            "parameters",
+            quoted(given),
+            "a mapping of names to values, bounds, ties or pt.Parameter, as {'mass': 0.18}",
         )
     return {plain_text(str(name)): _parameter(str(name), entry) for name, entry in given.items()}
 
@@ -146,9 +144,7 @@ def bounds_of(name: str, pair: object) -> tuple[float, float]:
     of = f" of {name}" if name else ""
     two = list(pair) if has_entries(pair) else []
     if len(two) != 2:
-        raise ParameterError(
-            f"bounds{of} are {quoted(pair)}: expected (low, high)", argument="bounds"
-        )
+        raise ParameterError(f"bounds{of}", quoted(pair), "(low, high)", verb="are")
     low, high = two
     return _core.as_number(f"lower bound{of}", low), _core.as_number(f"upper bound{of}", high)
 
@@ -157,9 +153,7 @@ def _prior_of(pair: object) -> tuple[float, float]:
     """Check that a prior is two numbers."""
     two = list(pair) if has_entries(pair) else []
     if len(two) != 2:
-        raise ParameterError(
-            f"prior is {quoted(pair)}: expected (value, standard deviation)", argument="prior"
-        )
+        raise ParameterError("prior", quoted(pair), "(value, standard deviation)")
     value, width = two
     return (
         _core.as_number("prior", value),

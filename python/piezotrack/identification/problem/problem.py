@@ -65,9 +65,10 @@ class Problem:
             for name in ("parameters", "constraints", "creep"):
                 if (value := getattr(self, name)) not in ({}, (), None):
                     raise ParameterError(
-                        f"{name} is {quoted(value)}: expected none with the model "
-                        f"'{self.model}', whose parameters follow by least squares",
-                        argument=name,
+                        name,
+                        quoted(value),
+                        f"none with the model '{self.model}', whose parameters follow by least "
+                        "squares",
                     )
 
     @classmethod
@@ -98,9 +99,10 @@ class Problem:
         for name, value in (("parameters", others), ("constraints", self.constraints)):
             if value:
                 raise ParameterError(
-                    f"{name} is {quoted(value)}: expected none with model='auto'; name the "
-                    "model whose parameters these are, as model='dahl'",
-                    argument=name,
+                    name,
+                    quoted(value),
+                    "none with model='auto'; name the model whose parameters these are, as "
+                    "model='dahl'",
                 )
 
     @property
@@ -179,16 +181,12 @@ def _inequalities(constraints: object) -> tuple[str, ...]:
     if constraints is None:
         return ()
     if not has_entries(constraints):
-        raise ParameterError(
-            f"constraints is {quoted(constraints)}: expected texts in a list, as ['a2 < b1']",
-            argument="constraints",
-        )
+        raise ParameterError("constraints", quoted(constraints), "texts in a list, as ['a2 < b1']")
     texts = tuple(constraints)
     for text in texts:
         if not isinstance(text, str):
             raise ParameterError(
-                f"constraint is {quoted(text)}: expected a text, as 'a2 < b1'",
-                argument="constraints",
+                "constraint", quoted(text), "a text, as 'a2 < b1'", argument="constraints"
             )
     return tuple(map(plain_text, texts))
 
@@ -199,8 +197,6 @@ def _creep_of(creep: object) -> bool | tuple[float, ...] | None:
         return creep
     if not has_entries(creep):
         raise ParameterError(
-            f"creep is {quoted(creep)}: expected True, False or time constants in seconds, "
-            "as [0.1, 1.0]",
-            argument="creep",
+            "creep", quoted(creep), "True, False or time constants in seconds, as [0.1, 1.0]"
         )
     return as_numbers("creep", creep)

@@ -74,17 +74,15 @@ class Record:
     def __post_init__(self) -> None:
         if not isinstance(self.data, Dataset):
             raise ParameterError(
-                f"data is {type(self.data).__name__}: expected a Dataset, as pt.read or "
-                "pt.Dataset.from_frame make it",
-                argument="data",
+                "data",
+                type(self.data).__name__,
+                "a Dataset, as pt.read or pt.Dataset.from_frame make it",
             )
         checked_history(self.history)
         offset = _core.as_truth("offset", self.offset)
         drift = _drift_of(self.drift)
         if not offset and drift:
-            raise ParameterError(
-                f"drift is {quoted(self.drift)}: expected none with offset=False", argument="drift"
-            )
+            raise ParameterError("drift", quoted(self.drift), "none with offset=False")
         object.__setattr__(self, "offset", offset)
         object.__setattr__(self, "drift", drift)
         object.__setattr__(self, "delay", _delay_of(self.delay))
@@ -145,10 +143,7 @@ def records_of(
     if all(isinstance(one, Record) for one in given):
         for name, value in values.items():
             if value is not None and not (name == "offset" and value is True):
-                raise ParameterError(
-                    f"{name} is {quoted(value)}: expected it in pt.Record, as {name}=",
-                    argument=name,
-                )
+                raise ParameterError(name, quoted(value), f"it in pt.Record, as {name}=")
     records = tuple(
         entry if isinstance(entry, Record) else Record(entry, **values)  # type: ignore[arg-type]
         for entry in given
@@ -157,7 +152,8 @@ def records_of(
     for i, dataset in enumerate(datasets):
         if dataset.drive_unit != datasets[0].drive_unit:
             raise ParameterError(
-                f"the drive of {label_of(dataset, i)} is in {dataset.drive_unit}: expected "
+                f"the drive of {label_of(dataset, i)}",
+                f"in {dataset.drive_unit}",
                 f"{datasets[0].drive_unit}, as that of {label_of(datasets[0], 0)}",
                 argument="data",
             )
@@ -168,21 +164,18 @@ def _listed(data: object) -> list[Dataset | Record]:
     """Check that records are a list of at least one."""
     if not isinstance(data, (list, tuple)):
         raise ParameterError(
-            f"data is {type(data).__name__}: expected a Dataset, as pt.read "
-            "or pt.Dataset.from_frame make it, or several in a list",
-            argument="data",
+            "data",
+            type(data).__name__,
+            "a Dataset, as pt.read or pt.Dataset.from_frame make it, or several in a list",
         )
     if not data:
-        raise ParameterError(
-            "data is an empty list: expected at least one Dataset", argument="data"
-        )
+        raise ParameterError("data", "an empty list", "at least one Dataset")
     for i, entry in enumerate(data):
         if not isinstance(entry, (Dataset, Record)):
             raise ParameterError(
-                f"data is a {type(data).__name__} whose record {i + 1} is "
-                f"{type(entry).__name__}: expected a Dataset, as pt.read or "
-                "pt.Dataset.from_frame make it, or a pt.Record",
-                argument="data",
+                "data",
+                f"a {type(data).__name__} whose record {i + 1} is {type(entry).__name__}",
+                "a Dataset, as pt.read or pt.Dataset.from_frame make it, or a pt.Record",
             )
     return list(data)
 
@@ -199,11 +192,7 @@ def of_record(label: str) -> Iterator[None]:
     try:
         yield
     except PiezotrackError as error:
-        if not label:
-            raise
-        labelled = type(error)(f"{label}: {error}")
-        vars(labelled).update(vars(error))
-        raise labelled from None
+        raise error.of(label) from None
 
 
 def labels_of(records: Sequence[Record]) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..._support.arguments import positive
+from ..._support.arguments import expect, positive
 from ...data.dataset import Dataset
 from ...errors import ParameterError, PiezotrackError
 from ..fitted.identified_model import IdentifiedModel
@@ -89,16 +89,14 @@ def posterior_models(
     >>> all(one.score(log).rms < 1.1 * fit.score(log).rms for one in nearby)
     True
     """
-    if not isinstance(model, IdentifiedModel):
-        raise ParameterError(f"model is {type(model).__name__}: expected a pt.IdentifiedModel")
-    if not isinstance(data, Dataset):
-        raise ParameterError(f"data is {type(data).__name__}: expected a Dataset")
+    expect("model", model, IdentifiedModel, "a pt.IdentifiedModel")
+    expect("data", data, Dataset, "a Dataset")
     positive("deviations", deviations, "")
     values = _fitted(model)
     if not values:
-        raise ParameterError("model has no values that were fitted: expected an identified one")
+        raise ParameterError("model", "no values that were fitted", "an identified one", verb="has")
     if len(data.t) < 2 * PARTS:
-        raise ParameterError(f"data has {len(data.t)} samples: expected {2 * PARTS} or more")
+        raise ParameterError("data", f"{len(data.t)} samples", f"{2 * PARTS} or more", verb="has")
     begins = _Beginning(model, data)
     columns = np.column_stack([begins.sensitivity(value) for value in values])
     axes = _axes(columns, begins.residual(model))

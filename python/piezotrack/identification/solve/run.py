@@ -46,7 +46,4 @@ class Run:
     def __post_init__(self) -> None:
         object.__setattr__(self, "threads", _core.as_count("threads", self.threads))
         if self.callback is not None and not callable(self.callback):
-            raise ParameterError(
-                f"callback is {quoted(self.callback)}: expected a function, or None",
-                argument="callback",
-            )
+            raise ParameterError("callback", quoted(self.callback), "a function, or None")

@@ -126,9 +126,7 @@ def _nodes(settings: LeastSquares, info: ModelInfo) -> list[float] | None:
     nodes = None
     for name, given in (("thresholds", settings.thresholds), ("levels", settings.levels)):
         if given is not None and name != info.nodes:
-            raise ParameterError(
-                f"{name} is {quoted(given)}: expected None, as {info.title} has no {name}"
-            )
+            raise ParameterError(name, quoted(given), f"None, as {info.title} has no {name}")
         nodes = nodes if given is None else list(given)
     return nodes
 

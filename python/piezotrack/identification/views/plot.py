@@ -64,7 +64,7 @@ def _check(data: Dataset, run: Response) -> None:
     expect("data", data, Dataset, "a Dataset")
     expect("run", run, Response, "what simulate returns")
     if run.x.size != data.y.size:
-        raise ShapeError(f"run has {run.x.size} samples: expected {data.y.size}, as the record")
+        raise ShapeError("run", f"{run.x.size} samples", f"{data.y.size}, as the record")
 
 
 def plot_loop(
@@ -193,7 +193,7 @@ def plot_convergence(
     """
     search = fit.search
     if search is None:
-        raise ParameterError("the model was fitted by least squares: expected one of a search")
+        raise ParameterError("fit", "a model fitted by least squares", "one of a search")
     (ax,) = axes_or_new(ax, 1)
     # A cost of 0 has no place on a logarithmic scale.
     shown = np.isfinite(search.history) & (search.history > 0.0)
@@ -333,7 +333,7 @@ def _shown(model: IdentifiedModel, data: Dataset | None) -> tuple[Dataset, Respo
     if data is not None:
         return data, model.simulate(data)
     if not isinstance(model, Identification):
-        raise ParameterError("data is None: expected a record, as a model from a file has none")
+        raise ParameterError("data", "None", "a record, as a model from a file has none")
     return model.data, model.simulate(model.data, offset=model.offset)
 
 

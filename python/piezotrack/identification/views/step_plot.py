@@ -187,5 +187,5 @@ def plot_step_result(step: StepResult, fig: Figure | SubFigure | None = None) ->
 def _trace(step: StepResult) -> StepTrace:
     expect("step", step, StepResult, "what pt.identify_step returns")
     if step.trace is None:
-        raise ParameterError("the readings were entered by hand: expected a record to draw")
+        raise ParameterError("step", "of readings entered by hand", "a record to draw")
     return step.trace

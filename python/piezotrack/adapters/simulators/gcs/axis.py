@@ -77,8 +77,10 @@ class VirtualAxis:
         self._slope = (ends[1] - ends[0]) / (high - low)
         if not (math.isfinite(self._slope) and self._slope):
             raise ParameterError(
-                f"stage rests at {ends[0]:g} um at {low:g} V and at {ends[1]:g} um at {high:g} V: "
-                "expected one that moves"
+                "stage",
+                f"at {ends[0]:g} um at {low:g} V and at {ends[1]:g} um at {high:g} V",
+                "one that moves",
+                verb="rests",
             )
         self._speed, self._clock = speed, clock
         self._now = 0.0

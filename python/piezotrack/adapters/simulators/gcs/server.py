@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Self
 
 from .... import _core
+from ...._support.arguments import expect
 from ....errors import ParameterError
 from ....hardware.limits import ordered
 from ....stages.virtual import VirtualStage
@@ -75,17 +76,18 @@ class GcsServer:
         port: int = 0,
         speed: float = 1.0,
     ) -> None:
-        if not isinstance(stage, VirtualStage):
-            raise ParameterError(
-                f"stage is {type(stage).__name__}: expected pt.VirtualStage, as VirtualStage.of "
-                "makes one of any model"
-            )
+        expect(
+            "stage",
+            stage,
+            VirtualStage,
+            "pt.VirtualStage, as VirtualStage.of makes it",
+        )
         within = ordered("limits", stage.amplifier.limits if limits is None else limits)
         port = checked_port(port)
         speed = _core.as_number("speed", speed)
         if not 0.0 < speed <= FASTEST:
             raise ParameterError(
-                f"speed is {speed:g}: expected above 0, and up to {FASTEST:g} times real time"
+                "speed", f"{speed:g}", f"above 0, and up to {FASTEST:g} times real time"
             )
         self._host, self._limits = host, within
         self._controller = VirtualController(stage, within, speed=speed)

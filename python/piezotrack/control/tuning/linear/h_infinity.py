@@ -138,22 +138,23 @@ def mixed_sensitivity(
     wanted = positive("bandwidth", bandwidth, "Hz")
     if wanted >= 0.25 * rate:
         raise ParameterError(
-            f"bandwidth is {wanted:g} Hz: expected below {0.25 * rate:g} Hz, a quarter of the "
-            "sampling rate"
+            "bandwidth",
+            f"{wanted:g} Hz",
+            f"below {0.25 * rate:g} Hz, a quarter of the sampling rate",
         )
     peak = positive("largest_sensitivity", largest_sensitivity, "parts of 1")
     if peak <= 1.0:
-        raise ParameterError(f"largest_sensitivity is {peak:g}: expected above 1")
+        raise ParameterError("largest_sensitivity", f"{peak:g}", "above 1")
     most = positive("effort", effort, "parts of 1")
     fall = None if roll_off is None else positive("roll_off", roll_off, "Hz")
     if fall is not None and not wanted < fall < 0.5 * rate:
         raise ParameterError(
-            f"roll_off is {fall:g} Hz: expected above the bandwidth and below {0.5 * rate:g} Hz"
+            "roll_off", f"{fall:g} Hz", f"above the bandwidth and below {0.5 * rate:g} Hz"
         )
     if limits is None and isinstance(stage, IdentifiedModel):
         limits = stage.drive_range
     if limits is None:
-        raise ParameterError("limits are missing: expected (low, high) in V")
+        raise ParameterError("limits", "missing", "(low, high) in V", verb="are")
     pair = number_pair("limits", limits, "V")
     linear = linearised_plants(plant_of(stage), pair, not_negative("delay", delay, "s"))[1]
     gain = linear.static_gain
@@ -163,9 +164,10 @@ def mixed_sensitivity(
     made, gamma = _designed(_bilinear(_plant(linear, gain, interval)), edge, peak, most, end)
     if not gamma <= FAR_ABOVE:
         raise ParameterError(
-            f"bandwidth is {wanted:g} Hz, with which gamma is {gamma:.3g}: expected 1 or little "
-            f"more, with a lower bandwidth, a largest_sensitivity above {peak:g} or an effort "
-            f"above {most:g}"
+            "bandwidth",
+            f"{wanted:g} Hz, with which gamma is {gamma:.3g}",
+            f"1 or little more, with a lower bandwidth, a largest_sensitivity above {peak:g} or "
+            f"an effort above {most:g}",
         )
     a, b, c, d = _back(made)
     law = MixedSensitivity(a, b.ravel() / gain, c.ravel(), d[0, 0] / gain, None, gamma, wanted)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ...._support.arguments import not_negative, number_pair, one_of
+from ...._support.arguments import expect, not_negative, number_pair, one_of
 from ...._support.arrays import check_dt
 from ....errors import ParameterError
 from ....identification.fitted.identified_model import IdentifiedModel
@@ -76,11 +76,10 @@ def to_control(
     if isinstance(part, (Controller, FeedbackLaw)):
         if limits is not None or delay != 0.0 or gain != "middle":
             raise ParameterError(
-                "limits, gain and delay have no effect on a feedback law: expected none"
+                "limits, gain or delay", "given", "none, as they have no effect on a feedback law"
             )
         return _feedback_law(part, dt)
-    if not isinstance(part, (VirtualStage, Stage, IdentifiedModel)):
-        raise ParameterError(f"part is {type(part).__name__}: expected a stage or a controller")
+    expect("part", part, (VirtualStage, Stage, IdentifiedModel), "a stage or a controller")
     return _stage(part, limits, gain, dt, not_negative("delay", delay, "s"))
 
 
@@ -102,7 +101,7 @@ def _stage(
     if limits is None and isinstance(stage, IdentifiedModel):
         limits = stage.drive_range
     if limits is None:
-        raise ParameterError("limits are missing: expected (low, high) in V")
+        raise ParameterError("limits", "missing", "(low, high) in V", verb="are")
     low, high = number_pair("limits", limits, "V")
     one_of("gain", gain, CASES)
     plant = plant_of(stage)
@@ -117,8 +116,10 @@ def _stage(
     if dt is None:
         if late > 0.0:
             raise ParameterError(
-                f"dt is missing: the stage has a delay of {late:g} s, which no continuous system "
-                "of a finite number of states has; expected a sampling interval"
+                "dt",
+                "missing",
+                f"a sampling interval, as the stage has a delay of {late:g} s, which no continuous "
+                "system of a finite number of states has",
             )
         system = (a, np.reshape(b, (-1, 1)), np.reshape(c, (1, -1)), [[d]])
         return _control().ss(*system, name=name, inputs=["voltage_V"], outputs=["displacement_m"])
@@ -183,12 +184,12 @@ def _feedback_law(part: Controller | FeedbackLaw, dt: float | None) -> Any:
     law: Any = part
     if isinstance(part, Controller):
         if dt is not None:
-            raise ParameterError(f"dt is {dt}: expected none, the controller has its own")
+            raise ParameterError("dt", dt, "none, the controller has its own")
         law, dt = part.feedback, part.dt
         if law is None:
-            raise ParameterError("part is a controller without feedback: expected one with it")
+            raise ParameterError("part", "a controller without feedback", "one with it")
     if dt is None:
-        raise ParameterError("dt is missing: expected the sampling interval of the loop in s")
+        raise ParameterError("dt", "missing", "the sampling interval of the loop in s")
     dt = check_dt(dt)
     control = _control()
     labels = {"inputs": ["error_m"], "outputs": ["voltage_V"]}
