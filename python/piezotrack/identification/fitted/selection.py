@@ -9,7 +9,7 @@ __all__ = ["Selection", "Trial"]
 
 
 class Trial(NamedTuple):
-    """One kind of stage that was tried.
+    """A model that was tried.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Selection:
     Attributes
     ----------
     trials : tuple of Trial
-        The kinds that were tried, the best first.
+        The models that were tried, the best first.
     fitted_until : float or None
         End of the part of the window that these were fitted to [s]; they were judged on the rest.
         None where the window is too short for two parts.

@@ -88,7 +88,7 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
         ):
             break
     if not found:
-        raise refused or DataError("no kind of stage could be fitted")
+        raise refused or DataError("no model could be fitted")
     best, info = best_of(found)
     whole = fit if rest is part and best is found[-1][0] else None
     if whole is None:
@@ -149,7 +149,7 @@ def best_of_several(problem: Problem, methods: MethodChoice, run: Run) -> Identi
         if np.all(rms < AS_NOISE * np.array(noise)) and all(is_white(one) for one in left):
             break
     if not found or fit is None:
-        raise refused or DataError("no kind of stage could be fitted")
+        raise refused or DataError("no model could be fitted")
     best, info = best_of(found)
     if apart or best is not found[-1][0]:
         fit = identify_model(problem.of_model(info), methods.method(info), run)
