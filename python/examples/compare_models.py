@@ -28,7 +28,7 @@ def virtual_logs() -> tuple[pt.Dataset, pt.Dataset]:
 
 
 def main() -> None:
-    """Fit each kind once, and judge it twice."""
+    """Fit each model once, and judge it twice."""
     out = Path(sys.argv[2] if len(sys.argv) > 2 else "comparison")
     out.mkdir(parents=True, exist_ok=True)
     if len(sys.argv) > 1:

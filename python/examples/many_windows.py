@@ -1,4 +1,4 @@
-"""A campaign: parts of a measured log, two kinds of model, six seeds each.
+"""A campaign: parts of a measured log, two models, six seeds each.
 
 Run as ``python many_windows.py [OUT]``; what is in the folder ``windows`` is not computed again.
 Shows how far the parts differ, and whether the seeds of a swarm end in one minimum. Writes the
@@ -24,7 +24,7 @@ def main() -> None:
         "method": pt.ParticleSwarm(particles=12, iterations=40, polish=False, runs=1),
         "history": "settled",
     }
-    models = {kind: {"model": kind, **short} for kind in ("first-order-dahl", "bouc-wen")}
+    models = {model: {"model": model, **short} for model in ("first-order-dahl", "bouc-wen")}
     found = pt.campaign(records, models, range(6), folder="windows")
     print(found.summary())
     found.plot().savefig(out / "campaign.png", dpi=100)

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from piezotrack.cli.identify import identify_command
 from typer import testing
 
 import piezotrack as pt
 from piezotrack.cli.advice import as_options, command_at_work
 from piezotrack.cli.commands import app
+from piezotrack.cli.models.identify import identify_command
 from piezotrack.data.log_file import write_log
 from records import BOX, HELD, quick
 

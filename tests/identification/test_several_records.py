@@ -495,7 +495,7 @@ def test_wrong_input_gets_one_sentence(records: Any, given: dict[str, Any], said
 
 
 def test_what_takes_one_record_refuses_several() -> None:
-    with pytest.raises(pt.ParameterError, match="data is list: expected a Dataset"):
+    with pytest.raises(pt.ParameterError, match=r"data is .*: expected a Dataset"):
         pt.compare([slow(), quick()])  # type: ignore[arg-type]
     with pytest.raises(pt.ParameterError, match="data is several records: expected one record"):
         pt.identification.Objective([slow(), quick()], "dahl")  # type: ignore[arg-type]

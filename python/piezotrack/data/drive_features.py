@@ -23,7 +23,7 @@ __all__ = [
     "DriveFeatures",
     "TimeFeatures",
     "drive_features",
-    "remarks",
+    "drive_notes",
     "reversals_text",
     "time_features",
 ]
@@ -245,7 +245,7 @@ def _mode_limit(t: Array, y: Array | None, shares: Array, lasting: Array, steps:
     return min(HIGHEST * rate, float(known.max())) if known.size else 0.0
 
 
-def remarks(time: TimeFeatures, drive: DriveFeatures, stroke: float | None) -> list[str]:
+def drive_notes(time: TimeFeatures, drive: DriveFeatures, stroke: float | None) -> list[str]:
     """Say in words which models a record can determine.
 
     Parameters

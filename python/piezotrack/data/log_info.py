@@ -20,7 +20,7 @@ from .drive_features import (
     DriveFeatures,
     TimeFeatures,
     drive_features,
-    remarks,
+    drive_notes,
     reversals_text,
     time_features,
 )
@@ -285,7 +285,7 @@ def info(
         found = drive_features(t, u, y, _si(roles["drive"]))
     sentences: list[str] = []
     if times is not None and found is not None:
-        sentences = remarks(times, found, stroke)
+        sentences = drive_notes(times, found, stroke)
     elif stroke is not None and problems and problems[0].startswith(NO_DRIVE):
         sentences = ["no drive: the noise of a sensor at rest (piezotrack noise), or a reference"]
     return LogInfo(

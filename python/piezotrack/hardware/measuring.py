@@ -220,18 +220,18 @@ def measure(
     """
     check_device(device)
     rate = _core.as_number("rate", rate)
-    exact, notes = obtained_rate(device, rate)
+    obtained, notes = obtained_rate(device, rate)
     if isinstance(drive, str):
         drive = parse_drive(drive)
     if isinstance(drive, Drive):
         # Before gigabytes of samples are made.
-        _check_count(device, "drive", drive.count(1.0 / exact))
-        volts = drive.sample(1.0 / exact)
+        _check_count(device, "drive", drive.count(1.0 / obtained))
+        volts = drive.sample(1.0 / obtained)
     elif notes:
         raise ParameterError(
             "rate",
             f"{rate:g} Hz",
-            f"{exact:.9g} Hz, which the device plays at, or a drive as a function of time",
+            f"{obtained:.9g} Hz, which the device plays at, or a drive as a function of time",
         )
     else:
         volts = np.array(signal_of("drive", drive))
@@ -246,17 +246,17 @@ def measure(
     check_table(device, "drive", volts)
     home = rest_of(device, rest)
     lead_in = in_range("lead_in", lead_in, MOST_LEAD_IN, "s")
-    table, first = ramped(device, "drive", volts, home, exact, not_negative("ramp", ramp, "s"))
+    table, first = ramped(device, "drive", volts, home, obtained, not_negative("ramp", ramp, "s"))
     with led_back(device, home):
-        record = play_table(device, table, exact, lead_in)
+        record = play_table(device, table, obtained, lead_in)
     y, more = filled(record)
     log = Dataset(
         u=record.volts,
         y=y,
-        dt=1.0 / exact,
+        dt=1.0 / obtained,
         hold="zoh",
         source=" to ".join(device.channels),
         notes=(*notes, *more),
     )
-    start = log.t[0] + (first - 0.5) / exact
-    return log[start : start + volts.size / exact]
+    start = log.t[0] + (first - 0.5) / obtained
+    return log[start : start + volts.size / obtained]

@@ -1,4 +1,4 @@
-"""``piezotrack campaign``: many logs, kinds of model and seeds, with a file for each result."""
+"""``piezotrack campaign``: many logs, models and seeds, with a file for each result."""
 
 from __future__ import annotations
 

@@ -250,7 +250,7 @@ DYNAMICS = {"auto": "auto", "none": None, "lag": "first", "mode": "second"}
 
 @dataclass(frozen=True)
 class Kinds:
-    """The kinds of model that one call of ``piezotrack identify`` is to identify."""
+    """The models that one call of ``piezotrack identify`` is to identify."""
 
     names: tuple[str, ...]
 

@@ -218,22 +218,22 @@ def _scheduled(task: Task) -> list[Entry | None]:
 
 def _repetitive(task: Task) -> list[Entry | None]:
     return [
-        Entry(task.tuned(one, parts=("pid", "low-pass", "repetitive")), one)
-        if can_be_learnt(one)
+        Entry(task.tuned(reference, parts=("pid", "low-pass", "repetitive")), reference)
+        if can_be_learnt(reference)
         else None
-        for one in task.references
+        for reference in task.references
     ]
 
 
 def _learnt(task: Task) -> list[Entry | None]:
     controller = task.tuned()
     entries: list[Entry | None] = []
-    for one in task.references:
-        if not can_be_learnt(one):
+    for reference in task.references:
+        if not can_be_learnt(reference):
             entries.append(None)
             continue
         try:
-            found = learn(task.stage, one, controller, timing=task.timing, trials=12)
+            found = learn(task.stage, reference, controller, timing=task.timing, trials=12)
         except ParameterError:
             # No table of this period converges on the set of models.
             entries.append(None)

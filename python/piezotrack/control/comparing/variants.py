@@ -71,10 +71,10 @@ def _slowed(stage: Stage, rate: float) -> Stage:
 def _scaled(stage: Stage, factors: dict[str, float]) -> Stage:
     """Multiply those parameters of a stage that it has."""
     changed: dict[str, Any] = {}
-    for one in fields(stage):  # type: ignore[arg-type]
-        value = getattr(stage, one.name)
-        if one.name in factors and value is not None:
-            changed[one.name] = (np.array(value) * factors[one.name]).tolist()
+    for parameter in fields(stage):  # type: ignore[arg-type]
+        value = getattr(stage, parameter.name)
+        if parameter.name in factors and value is not None:
+            changed[parameter.name] = (np.array(value) * factors[parameter.name]).tolist()
     return replace(stage, **changed)  # type: ignore[type-var]
 
 

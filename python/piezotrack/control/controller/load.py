@@ -87,8 +87,8 @@ def _controller_of(document: dict[str, Any]) -> Controller:
         feedback=part_of("feedback", document["feedback"], names_of("law"), drive),
         repetitive=part_of("repetitive", document["repetitive"], names_of("repetitive"), drive),
         filters=tuple(
-            part_of(f"filters[{i}]", one, names_of("filter"), drive)
-            for i, one in enumerate(filters)
+            part_of(f"filters[{i}]", entry, names_of("filter"), drive)
+            for i, entry in enumerate(filters)
         ),
     )
 

@@ -314,10 +314,10 @@ class _Network:
     def numbers(self) -> Numbers:
         """Numbers that the core takes."""
         hidden, biases, outputs, direct = self.split(self.weights)
-        one, two, three = self.scales.tolist()
+        displacement, velocity, acceleration = self.scales.tolist()
         return (
             self.centre,
-            (one, two, three),
+            (displacement, velocity, acceleration),
             self.thresholds.tolist(),
             hidden.ravel().tolist(),
             biases.tolist(),

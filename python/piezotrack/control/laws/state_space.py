@@ -88,8 +88,13 @@ class StateSpace(FeedbackLaw):
         return (len(self._matrices[1]),)
 
     def _linear(self, dt: float) -> tuple[Any, ...]:  # noqa: ARG002 - it is sampled
-        one = self._values
-        return one["a"], np.reshape(one["b"], (-1, 1)), np.reshape(one["c"], (1, -1)), [[one["d"]]]
+        values = self._values
+        return (
+            values["a"],
+            np.reshape(values["b"], (-1, 1)),
+            np.reshape(values["c"], (1, -1)),
+            [[values["d"]]],
+        )
 
 
 def _single(name: str, value: object) -> object:

@@ -340,13 +340,13 @@ class IterativeLearning:
             measured = [measured]
         if isinstance(measured, Sequence) and any(isinstance(one, Dataset) for one in measured):
             dt = self._controller.dt
-            for one in measured:
-                if not isinstance(one, Dataset):
-                    raise ParameterError("measured", quoted(one), "records only", verb="has")
-                if abs(one.dt - dt) > 1e-6 * dt:
+            for record in measured:
+                if not isinstance(record, Dataset):
+                    raise ParameterError("measured", quoted(record), "records only", verb="has")
+                if abs(record.dt - dt) > 1e-6 * dt:
                     raise DataError(
-                        f"measured has a sampling interval of {one.dt:g} s: expected that of the "
-                        f"controller, {dt:g} s"
+                        f"measured has a sampling interval of {record.dt:g} s: expected that of "
+                        f"the controller, {dt:g} s"
                     )
             measured = [one.y for one in measured if isinstance(one, Dataset)]
         try:

@@ -213,17 +213,17 @@ def frequency_rule(
     dt = nominal.controller.dt
     frequency = np.arange(samples // 2 + 1) / (samples * dt)
     model = nominal.response(frequency)
-    heard = np.abs(model) > NOTHING * np.abs(model).max()
-    learning = np.where(heard, gain / np.where(heard, model, 1.0), 0.0)
+    excited = np.abs(model) > NOTHING * np.abs(model).max()
+    learning = np.where(excited, gain / np.where(excited, model, 1.0), 0.0)
     left = [np.abs(forgetting_factor - learning * one.response(frequency)) for one in plants]
 
     def made(edge: float) -> FrequencyRule:
-        smoothing = np.where(heard, 1.0 / (1.0 + (frequency / edge) ** (2 * ORDER)), 0.0)
+        smoothing = np.where(excited, 1.0 / (1.0 + (frequency / edge) ** (2 * ORDER)), 0.0)
         cases = []
-        for one, share in zip(plants, left, strict=True):
+        for plant, share in zip(plants, left, strict=True):
             remains = smoothing * share
             k = int(np.argmax(remains))
-            cases.append((one.name, float(remains[k]), float(frequency[k])))
+            cases.append((plant.name, float(remains[k]), float(frequency[k])))
         return FrequencyRule(
             frequency=frequency,
             learning=learning,
@@ -323,8 +323,8 @@ def lifted_rule(
             "reference", f"{samples} samples", f"8 more than the {late} of the delay", verb="has"
         )
 
-    def lifted(one: Array) -> Array:
-        whole: Array = toeplitz(one, np.zeros(samples))
+    def lifted(response: Array) -> Array:
+        whole: Array = toeplitz(response, np.zeros(samples))
         return whole[late:, :count]
 
     model = lifted(pulse)
@@ -337,8 +337,8 @@ def lifted_rule(
 
     def made(edge: float) -> LiftedRule:
         cases = [
-            (one.name, *_largest(_smoothed(rest, edge * dt), dt))
-            for one, rest in zip(plants, left, strict=True)
+            (plant.name, *_largest(_smoothed(rest, edge * dt), dt))
+            for plant, rest in zip(plants, left, strict=True)
         ]
         return LiftedRule(
             keeping=_smoothed(still, edge * dt),
@@ -366,10 +366,10 @@ def _smoothed(columns: NDArray[np.floating[Any]], edge: float) -> Array:
     rows[ORDER] = 1.0
     weight = (2.0 * np.sin(np.pi * min(edge, HIGHEST_EDGE))) ** (-2 * ORDER)
     taps = np.array([-1.0, 3.0, -3.0, 1.0])
-    for i, one in enumerate(taps):
+    for i, tap in enumerate(taps):
         for j in range(i, taps.size):
             # Upper diagonals as solveh_banded keeps them, by the column.
-            rows[ORDER - (j - i), j : count - ORDER + j] += weight * one * taps[j]
+            rows[ORDER - (j - i), j : count - ORDER + j] += weight * tap * taps[j]
     smooth: Array = solveh_banded(rows, columns)
     return smooth
 

@@ -44,12 +44,12 @@ def check_drive_unit(stage: object, controller: Controller) -> None:
     """Refuse a model that is driven by a position under a controller of volts, or the reverse."""
     if not isinstance(stage, IdentifiedModel):
         return
-    one, other = stage.drive_unit, controller.drive_unit
-    if "m" in (one, other) and one != other:
+    unit, other = stage.drive_unit, controller.drive_unit
+    if "m" in (unit, other) and unit != other:
         raise ParameterError(
             "controller",
             f"the drive_unit {other!r}",
-            f"that of the model, {one!r}, as pt.Controller.of gives it",
+            f"that of the model, {unit!r}, as pt.Controller.of gives it",
             verb="has",
         )
 
@@ -88,12 +88,12 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
     report = check_loop(stage, controller, delay=delay)
     if report.stable:
         return
-    one = report.middle
-    found = f"the loop is unstable on this stage, {one.gain_text}"
+    middle = report.middle
+    found = f"the loop is unstable on this stage, {middle.gain_text}"
     law = controller.feedback
-    without = one.gain_margin is not None and one.gain_margin < 1.0
-    if without and one.stable_gains is not None and one.stable_gains[1] < 1.0:
-        low, share = one.stable_gains
+    without = middle.gain_margin is not None and middle.gain_margin < 1.0
+    if without and middle.stable_gains is not None and middle.stable_gains[1] < 1.0:
+        low, share = middle.stable_gains
         if law is not None and law.info.name == "pid":
             unit, scale = shown_unit(controller.drive_unit)
             kp = 1e-6 * scale * law._pid.kp
@@ -103,10 +103,12 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
         else:
             found += f"; at the limit the gain would be {share:.3g} times as large"
     elif without:
-        found += f"; at the limit the feedback's gain would be {one.gain_margin:.3g} times as large"
+        found += (
+            f"; at the limit the feedback's gain would be {middle.gain_margin:.3g} times as large"
+        )
     elif controller.repetitive is not None:
         found += "; without the repetitive part it is stable, so lower kq or take another filter"
-    hint = f" ({one.hint})" if one.hint else ""
+    hint = f" ({middle.hint})" if middle.hint else ""
     words = f"{found}{hint}: expected a stable one, or unstable=True"
     raise ParameterError(words, argument="controller")
 

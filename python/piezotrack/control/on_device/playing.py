@@ -182,8 +182,8 @@ def play(
     if isinstance(controller, Inverse):
         if rate is None:
             raise ParameterError("rate", "not given", "the sampling rate of an inverse, Hz")
-        exact, _ = obtained_rate(device, _core.as_number("rate", rate))
-        controller = Controller(dt=1.0 / exact, limits=device.limits, feedforward=controller)
+        obtained, _ = obtained_rate(device, _core.as_number("rate", rate))
+        controller = Controller(dt=1.0 / obtained, limits=device.limits, feedforward=controller)
     elif rate is not None:
         raise ParameterError("rate", f"{rate!r}", "none, as the controller has an interval")
     check_playable(device, controller)

@@ -161,13 +161,15 @@ def only(place: str, entry: Mapping[str, Any], keys: Iterable[str]) -> None:
         raise ParameterError(f"{before}{missing[0]!r}", "missing", f"all of {known}")
 
 
-def _read(place: str, one: Number, value: Any, drive: str) -> Any:
-    match one.form:
+def _read(place: str, number: Number, value: Any, drive: str) -> Any:
+    match number.form:
         case "part":
-            return part_of(place, value, one.choices, drive)
+            return part_of(place, value, number.choices, drive)
         case "parts":
             listed = value if isinstance(value, list) else [value]
-            return [part_of(f"{place}[{i}]", p, one.choices, drive) for i, p in enumerate(listed)]
+            return [
+                part_of(f"{place}[{i}]", p, number.choices, drive) for i, p in enumerate(listed)
+            ]
         case "stage":
             return stage_of(place, value, drive)
         case "numbers":

@@ -115,9 +115,9 @@ class Schedule(Result):
             "scheduled_rms_m": errors[:, 1],
         }
         prefixes = ("",) if len(self.controllers) == 1 else ("x_", "y_")
-        for prefix, one in zip(prefixes, self.controllers, strict=True):
-            law: Any = one.feedback
-            for name, unit in (("kp", f"{one.drive_unit}_per_m"), ("ti", "s"), ("td", "s")):
+        for prefix, controller in zip(prefixes, self.controllers, strict=True):
+            law: Any = controller.feedback
+            for name, unit in (("kp", f"{controller.drive_unit}_per_m"), ("ti", "s"), ("td", "s")):
                 gains = [getattr(gains, name) for gains in law.gains]
                 columns[f"{prefix}{name}_{unit}"] = np.array(gains)
         return columns
@@ -302,8 +302,8 @@ def _error(
     """Rms error [m] along a reference, beginning with the gains of its place."""
     laws: list[Any] = [one.feedback for one in controllers]
     loops = [
-        replace(one, feedback=replace(law, first=place))
-        for one, law in zip(controllers, laws, strict=True)
+        replace(controller, feedback=replace(law, first=place))
+        for controller, law in zip(controllers, laws, strict=True)
     ]
     how: dict[str, Any] = {"timing": timing, "beyond_reach": True, "unstable": True}
     if isinstance(stage, XYStage):
@@ -357,6 +357,6 @@ def _check_between(controller: Controller, plants: list[_core.LoopPlant], margin
                 )
 
 
-def _weights(one: Pid) -> tuple[float, float, float]:
+def _weights(gains: Pid) -> tuple[float, float, float]:
     """Proportional gain, integral gain [V/(m s)] and derivative gain [V s/m]."""
-    return one.kp, one.kp / one.ti, one.kp * one.td
+    return gains.kp, gains.kp / gains.ti, gains.kp * gains.td

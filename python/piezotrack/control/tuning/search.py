@@ -132,8 +132,8 @@ def search_at(problem: TuningProblem, dt: float) -> Solution:
 
 def _axis_search(problem: TuningProblem, axis: Axis, dt: float) -> AxisSearch:
     plants = [
-        NamedPlant(f"{axis.name}, {one.name}" if axis.name else one.name, one.plant)
-        for one in plants_of(axis.stages, problem.limits, axis.timing.delay, problem.spread)
+        NamedPlant(f"{axis.name}, {plant.name}" if axis.name else plant.name, plant.plant)
+        for plant in plants_of(axis.stages, problem.limits, axis.timing.delay, problem.spread)
     ]
     cores = [one.plant for one in plants]
     parts = problem.parts or _usual_parts(problem, cores, dt)

@@ -190,8 +190,8 @@ class Tuned(Result):
             return [
                 write_document(path / "tuning.json", self.document()),
                 *(
-                    one.save(path / f"{name}.json", report=self)
-                    for name, one in zip(names, self.controllers, strict=True)
+                    controller.save(path / f"{name}.json", report=self)
+                    for name, controller in zip(names, self.controllers, strict=True)
                 ),
                 *save_figures(pictures, path),
             ]

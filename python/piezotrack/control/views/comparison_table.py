@@ -176,6 +176,6 @@ def _line(name: str, cells: Sequence[str], first: int, widths: Sequence[int]) ->
 def comparison_html(comparison: ControllerComparison) -> str:
     """Write the tables for a notebook."""
     return "".join(
-        words(one.title, [(name, *cells) for name, cells in one.rows], ["", *one.heads]).html()
-        for one in grids(comparison)
+        words(grid.title, [(name, *cells) for name, cells in grid.rows], ["", *grid.heads]).html()
+        for grid in grids(comparison)
     )

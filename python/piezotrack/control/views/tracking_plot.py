@@ -66,11 +66,11 @@ def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
     (ax,) = axes_or_new(ax, 1)
     ax.plot(run.t, 1e6 * run.error, **{**ERROR, "label": "desired - measured"})
     period = run.reference.period
-    for i, one in enumerate(run.periods):
+    for i, figures in enumerate(run.periods):
         assert period is not None
         span = (i * period, min((i + 1) * period, _end(run)))
         label = None if i else "largest of each period"
-        ax.plot(span, 2 * [1e6 * one.max_error], **{**LEVEL, "label": label})
+        ax.plot(span, 2 * [1e6 * figures.max_error], **{**LEVEL, "label": label})
     ax.axhline(0.0, **GUIDE)
     ax.set(xlabel="time [s]", ylabel="tracking error [um]")
     _crop_start(ax, run)

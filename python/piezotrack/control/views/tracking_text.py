@@ -25,9 +25,9 @@ def tracking_text(run: Tracking) -> str:
     if run.periods:
         lines.append("period  max um  rms um  mean um")
         lines += [
-            f"{i:>6}  {1e6 * one.max_error:>6.3f}  {1e6 * one.rms_error:>6.3f}  "
-            f"{1e6 * one.mean_error:>7.3f}"
-            for i, one in enumerate(run.periods, 1)
+            f"{i:>6}  {1e6 * figures.max_error:>6.3f}  {1e6 * figures.rms_error:>6.3f}  "
+            f"{1e6 * figures.mean_error:>7.3f}"
+            for i, figures in enumerate(run.periods, 1)
         ]
     return "\n".join(lines)
 

@@ -120,9 +120,9 @@ def _parts(controller: Controller) -> str:
     return "\n".join(text) or "no feedback"
 
 
-def _filter_text(one: Filter) -> str:
-    values = one._values
-    if one.info.name == "low-pass":
+def _filter_text(part: Filter) -> str:
+    values = part._values
+    if part.info.name == "low-pass":
         return f"low-pass: {values['cutoff']:.4g} Hz"
     frequency, width, depth = (values[name] for name in ("frequency", "width", "depth"))
     return f"notch: {frequency:.4g} Hz, width {width:.3g}, depth {depth:.3g}"
@@ -141,9 +141,9 @@ def _places(found: Schedule, controller: Controller) -> str:
     lines = [f"amplitude um  rate Hz  kp {unit}/um    ti ms    td ms   rms um: fixed, scheduled"]
     places = [(amplitude, rate) for amplitude in found.amplitudes for rate in found.rates]
     errors = found.errors.reshape(-1, 2)
-    for (amplitude, rate), one, (before, after) in zip(places, law.gains, errors, strict=True):
+    for (amplitude, rate), gains, (before, after) in zip(places, law.gains, errors, strict=True):
         lines.append(
-            f"{1e6 * amplitude:>12g} {rate:>8g} {1e-6 * scale * one.kp:>8.4g} "
-            f"{1e3 * one.ti:>8.3g} {1e3 * one.td:>8.3g}   {1e6 * before:.4f}, {1e6 * after:.4f}"
+            f"{1e6 * amplitude:>12g} {rate:>8g} {1e-6 * scale * gains.kp:>8.4g} "
+            f"{1e3 * gains.ti:>8.3g} {1e3 * gains.td:>8.3g}   {1e6 * before:.4f}, {1e6 * after:.4f}"
         )
     return "\n".join(lines)

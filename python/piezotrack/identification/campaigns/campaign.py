@@ -127,20 +127,22 @@ def campaign(
             for seed in (numbers if problem.is_searched else [None])
         )
     ]
-    found = {one.name: place.result(one.name) for one in planned}
-    missing = [one for one in planned if (found[one.name] or {}).get("format") in (None, FAILURE)]
+    found = {task.name: place.result(task.name) for task in planned}
+    missing = [
+        task for task in planned if (found[task.name] or {}).get("format") in (None, FAILURE)
+    ]
     if missing:
         found |= compute(missing, executor, place, len(planned), progress)
     results = [
         TaskResult(
-            record=one.record,
-            model=one.model,
-            seed=one.task.seed,
-            file=place.file(one.name),
+            record=task.record,
+            model=task.model,
+            seed=task.task.seed,
+            file=place.file(task.name),
             document=document,
         )
-        for one in planned
-        if (document := found[one.name]) is not None
+        for task in planned
+        if (document := found[task.name]) is not None
     ]
     return Campaign(results=tuple(results), folder=place.path)
 

@@ -107,8 +107,8 @@ class CampaignFolder:
             )
         for title, settings in models.items():
             if said.get(title, settings) not in (settings, json_ready(settings)) and any(
-                one["format"] == MODEL and one["campaign"].get("model") == title
-                for one in self.results()
+                document["format"] == MODEL and document["campaign"].get("model") == title
+                for document in self.results()
             ):
                 raise DataError(
                     f"folder {self.path} has the model '{title}' with other settings, "

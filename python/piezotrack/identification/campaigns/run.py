@@ -92,11 +92,11 @@ def compute(
     found: dict[str, Document] = {}
     failed = 0
 
-    def keep(one: Planned, document: Document) -> None:
+    def keep(planned: Planned, document: Document) -> None:
         nonlocal failed
-        document["campaign"] |= {"record": one.record, "model": one.model}
+        document["campaign"] |= {"record": planned.record, "model": planned.model}
         place.store(document)
-        found[one.name] = document
+        found[planned.name] = document
         failed += document["format"] == FAILURE
 
     def done() -> int:
@@ -109,8 +109,8 @@ def compute(
         run = _Run(workers, missing)
         try:
             bar.step(done(), total, f"{total} tasks")
-            for one, document in run.outcomes():
-                keep(one, document)
+            for planned, document in run.outcomes():
+                keep(planned, document)
                 more = f", {failed} without a model" if failed else ""
                 bar.step(done(), total, f"{total} tasks{more}")
         except KeyboardInterrupt:
@@ -213,17 +213,19 @@ class _Run:
         """Keep the executor supplied; return whether there is anything to wait for."""
         executor, threads, stop = self._workers
         while self._waiting and (len(self._ahead) < AHEAD or self._size < AHEAD_BYTES):
-            one = self._waiting.popleft()
+            planned = self._waiting.popleft()
             arguments = () if stop is None else (stop.is_set,)
             try:
-                future = executor.submit(run_task, replace(one.task, threads=threads), *arguments)
+                future = executor.submit(
+                    run_task, replace(planned.task, threads=threads), *arguments
+                )
             except Exception as error:
                 # It takes no more; what it has may still come.
                 self.trouble = self.trouble or error
                 self._waiting.clear()
                 break
-            self._size += _size(one)
-            self._ahead[future] = one
+            self._size += _size(planned)
+            self._ahead[future] = planned
             future.add_done_callback(self._ended.put)
         return bool(self._ahead)
 
@@ -232,9 +234,9 @@ def _nothing() -> None:
     """Do nothing, elsewhere."""
 
 
-def _size(one: Planned) -> int:
+def _size(planned: Planned) -> int:
     """Bytes of a record: times, drive and displacement."""
-    (record,) = one.task.problem.records
+    (record,) = planned.task.problem.records
     return 24 * (len(record.data) + record.data.warmup)
 
 

@@ -66,16 +66,16 @@ def parts_of(log: Dataset, train: object, test: object) -> tuple[Dataset, Datase
     return one, two, True
 
 
-def _check_apart(one: Dataset, two: Dataset) -> None:
+def _check_apart(train: Dataset, test: Dataset) -> None:
     """Refuse two windows that share a part of one record."""
-    begin, end = max(one.t[0], two.t[0]), min(one.t[-1], two.t[-1])
-    shared = [(part.t >= begin) & (part.t <= end) for part in (one, two)]
-    if not shared[0].any() or not np.array_equal(one.y[shared[0]], two.y[shared[1]]):
+    begin, end = max(train.t[0], test.t[0]), min(train.t[-1], test.t[-1])
+    shared = [(part.t >= begin) & (part.t <= end) for part in (train, test)]
+    if not shared[0].any() or not np.array_equal(train.y[shared[0]], test.y[shared[1]]):
         return
     raise ParameterError(
         "test",
-        f"from {two.t[0]:.6g} to {two.t[-1]:.6g} s and train from {one.t[0]:.6g} to "
-        f"{one.t[-1]:.6g} s",
+        f"from {test.t[0]:.6g} to {test.t[-1]:.6g} s and train from {train.t[0]:.6g} to "
+        f"{train.t[-1]:.6g} s",
         "windows that do not overlap",
         verb="goes",
     )

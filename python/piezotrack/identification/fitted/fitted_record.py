@@ -91,9 +91,9 @@ def record_of(records: Sequence[FittedRecord], data: Dataset) -> FittedRecord | 
         return next(iter(alike), None)
     first, last = float(data.t[0]), float(data.t[-1])
 
-    def apart(one: FittedRecord) -> tuple[bool, bool]:
-        low, high = one.origin.get("window_s") or (first, last)
-        return one.origin.get("sha256") != data.sha256, high < first or last < low
+    def apart(record: FittedRecord) -> tuple[bool, bool]:
+        low, high = record.origin.get("window_s") or (first, last)
+        return record.origin.get("sha256") != data.sha256, high < first or last < low
 
     return min(alike, key=apart)
 
@@ -117,16 +117,16 @@ def record_entries(records: Sequence[FittedRecord], unit: str) -> dict[str, Any]
         return {}
     found = [
         {
-            "weight": one.weight,
-            "delay": {"value": one.delay, "unit": "s"},
-            "offset": {"value": one.offset, "unit": "m", "fitted": one.offset_fitted},
-            "cost": {"value": one.cost, "unit": "m"},
-            "stroke": {"value": one.stroke, "unit": "m"},
-            "start": start_entry(one.start, unit),
-            **drift_entry(one.drift),
-            "data": dict(one.origin),
+            "weight": record.weight,
+            "delay": {"value": record.delay, "unit": "s"},
+            "offset": {"value": record.offset, "unit": "m", "fitted": record.offset_fitted},
+            "cost": {"value": record.cost, "unit": "m"},
+            "stroke": {"value": record.stroke, "unit": "m"},
+            "start": start_entry(record.start, unit),
+            **drift_entry(record.drift),
+            "data": dict(record.origin),
         }
-        for one in records
+        for record in records
     ]
     return {"records": found}
 

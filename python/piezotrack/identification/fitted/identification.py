@@ -161,10 +161,10 @@ class Identification(IdentifiedModel):
         info, unit = self.model.info, self.data.drive_unit
         notes: list[str] = []
         several = len(self.records) > 1
-        for i, ((data, one), run) in enumerate(zip(self._fitted, self._responses, strict=True)):
+        for i, ((data, record), run) in enumerate(zip(self._fitted, self._responses, strict=True)):
             source = f" ({data.source})" if data.source else ""
             which = f"record {i + 1}{source}: " if several else ""
-            notes += [which + note for note in self._notes_on(data, one, run)]
+            notes += [which + note for note in self._notes_on(data, record, run)]
         if info.drive_unit == "N" and unit != "N":
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
         rates = [_frequency(data) for data, _ in self._fitted]
@@ -179,24 +179,24 @@ class Identification(IdentifiedModel):
             notes.append(f"no other {what} ended in the minimum of the best one: increase runs=")
         return notes
 
-    def _notes_on(self, data: Dataset, one: FittedRecord, run: Response) -> list[str]:
+    def _notes_on(self, data: Dataset, record: FittedRecord, run: Response) -> list[str]:
         """Warnings about one of the records and the fit there."""
         notes, rest = diagnostics.record_warnings(data), data.y - run.x
-        if one.cost_percent > 5.0:
+        if record.cost_percent > 5.0:
             notes.append(
                 "the model does not fit this record: the residual is "
-                f"{one.cost_percent:.3g} % of stroke"
+                f"{record.cost_percent:.3g} % of stroke"
             )
-        if one.cost_percent > diagnostics.REMAINS:
+        if record.cost_percent > diagnostics.REMAINS:
             held = [name for name, estimate in self.parameters.items() if not estimate.free]
             notes += diagnostics.fit_warnings(
-                data, run.x, one.cost_percent, self.model.info.hysteresis, held
+                data, run.x, record.cost_percent, self.model.info.hysteresis, held
             )
-        notes += drift_notes(one.drift, one.stroke)
+        notes += drift_notes(record.drift, record.stroke)
         notes += self.model._notes(lambda: run)
         if self.selection:
             # A mode moves from sample to sample as noise does; what is left of it hardly does.
-            notes += above_noise(one.cost, min(sample_noise(data.y), sample_noise(rest)))
+            notes += above_noise(record.cost, min(sample_noise(data.y), sample_noise(rest)))
         return notes + first_samples(rest, data)
 
     @property

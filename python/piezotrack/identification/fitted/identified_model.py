@@ -215,9 +215,9 @@ class IdentifiedModel(Result):
             The window [s] if it overlaps `data`; None otherwise.
         """
         expect("data", data, Dataset, "a Dataset")
-        for one in self._origins:
-            window = one.get("window_s")
-            same = data.source is not None and one.get("source") == data.source
+        for origin in self._origins:
+            window = origin.get("window_s")
+            same = data.source is not None and origin.get("source") == data.source
             if same and window and window[0] <= data.t[-1] and window[1] >= data.t[0]:
                 return float(window[0]), float(window[1])
         return None
@@ -333,9 +333,9 @@ class IdentifiedModel(Result):
             data
         )
         signals = {
-            one.name: value[start:]
-            for one in fields(run)
-            if isinstance(value := getattr(run, one.name), np.ndarray)
+            signal.name: value[start:]
+            for signal in fields(run)
+            if isinstance(value := getattr(run, signal.name), np.ndarray)
         }
         signals |= {"t": data.t, "u": data.u, "x": x}
         windowed: Response = replace(run, **signals)

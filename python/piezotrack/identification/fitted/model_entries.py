@@ -57,12 +57,12 @@ def parameter_entries(stage: InvertibleStage, drive: str) -> dict[str, dict[str,
         Value, unit and symbol of each parameter, by its name.
     """
     return {
-        one.name: {
-            "value": _plain(getattr(stage, one.name)),
-            "unit": of_drive(one.unit, drive),
-            "symbol": one.symbol,
+        parameter.name: {
+            "value": _plain(getattr(stage, parameter.name)),
+            "unit": of_drive(parameter.unit, drive),
+            "symbol": parameter.symbol,
         }
-        for one in stage.info.parameters
+        for parameter in stage.info.parameters
     }
 
 
@@ -71,14 +71,14 @@ def _plain(value: Any) -> Any:
 
 
 def drive_unit_of(details: Mapping[str, Any], info: ModelInfo) -> str:
-    """Return the unit of the drive of a model: that of its record, or else that of its kind.
+    """Return the unit of the drive of a model: that of its record, or else that of its class.
 
     Parameters
     ----------
     details : mapping
         Entries of its file.
     info : ModelInfo
-        The kind.
+        The model.
 
     Returns
     -------

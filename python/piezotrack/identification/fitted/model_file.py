@@ -139,15 +139,15 @@ def stage_of(info: ModelInfo, parameters: dict[str, Any], drive: str) -> Stage:
     ParameterError
         A parameter is in another unit, or out of its range.
     """
-    for one in info.parameters:
-        unit = of_drive(one.unit, drive)
-        if one.is_list and one.is_optional and one.name not in parameters:
-            parameters[one.name] = {"value": [], "unit": unit}
-        require_unit(one.name, parameters[one.name], unit)
-    values = {one.name: parameters[one.name]["value"] for one in info.parameters}
-    for one in info.parameters:
-        if one.is_list:
-            values[one.name] = tuple(values[one.name])
+    for parameter in info.parameters:
+        unit = of_drive(parameter.unit, drive)
+        if parameter.is_list and parameter.is_optional and parameter.name not in parameters:
+            parameters[parameter.name] = {"value": [], "unit": unit}
+        require_unit(parameter.name, parameters[parameter.name], unit)
+    values = {parameter.name: parameters[parameter.name]["value"] for parameter in info.parameters}
+    for parameter in info.parameters:
+        if parameter.is_list:
+            values[parameter.name] = tuple(values[parameter.name])
     return stage_class(info)(**values)
 
 

@@ -89,7 +89,7 @@ def deviation_of(records: Sequence[tuple[Dataset, float]]) -> float:
 
 
 def above_noise(cost: float, noise: float) -> list[str]:
-    """Say that the best kind leaves more than the noise.
+    """Say that the best model leaves more than the noise.
 
     Parameters
     ----------
@@ -106,14 +106,14 @@ def above_noise(cost: float, noise: float) -> list[str]:
     Examples
     --------
     >>> above_noise(50e-9, 10e-9)
-    ['the residual is 5 times the noise between samples, 10 nm: no kind that was tried describes \
+    ['the residual is 5 times the noise between samples, 10 nm: no model that was tried describes \
 all of the motion']
     """
     if noise <= 0.0 or cost <= NOISY * noise:
         return []
     return [
         f"the residual is {cost / noise:.2g} times the noise between samples, "
-        f"{1e9 * noise:.3g} nm: no kind that was tried describes all of the motion"
+        f"{1e9 * noise:.3g} nm: no model that was tried describes all of the motion"
     ]
 
 
@@ -191,22 +191,22 @@ def extrapolation_notes(
     >>> extrapolation_notes(np.array([0.0, 90.0]), 1.0, (0.0, 75.0), None)
     ['the drive goes from 0 to 90 V, that of the record identified from 0 to 75 V']
     """
-    remarks = []
+    notes = []
     name, scale = shown_unit(unit)
     low, high = float(u.min()), float(u.max())
     if fitted is not None:
         margin = MARGIN * (fitted[1] - fitted[0])
         if low < fitted[0] - margin or high > fitted[1] + margin:
-            remarks.append(
+            notes.append(
                 f"the drive goes from {scale * low:.4g} to {scale * high:.4g} {name}, that of the "
                 f"record identified from {scale * fitted[0]:.4g} to {scale * fitted[1]:.4g} {name}"
             )
     if rate and dt is not None and (found := drive_rate(u, dt)) > FASTER * rate:
-        remarks.append(
+        notes.append(
             f"the drive moves at up to {scale * found:.3g} {name}/s, that of the record identified "
             f"at {scale * rate:.3g} {name}/s: the dynamics beyond that rate were not fitted"
         )
-    return remarks
+    return notes
 
 
 def start_notes(start: Start | None, data: Dataset) -> str | None:

@@ -360,9 +360,9 @@ class _Search:
         rest = self.residual(self.data, state)
         return float(np.std(rest) if self.offset else np.sqrt(np.mean(rest**2)))
 
-    def differ(self, one: Start, other: Start, rms: float) -> bool:
+    def differ(self, start: Start, other: Start, rms: float) -> bool:
         """Whether two starts differ by what the record shows."""
-        gap = self.residual(self.data, one.state) - self.residual(self.data, other.state)
+        gap = self.residual(self.data, start.state) - self.residual(self.data, other.state)
         return float(np.std(gap)) > SHOWS * rms
 
     def fitted(self) -> Start:

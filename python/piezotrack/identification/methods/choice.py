@@ -64,8 +64,8 @@ class MethodChoice:
         """
         given = method if isinstance(method, (list, tuple)) else () if method is None else (method,)
         found: dict[str, Any] = {}
-        for one in given:
-            checked = _named(one, any_model=info is None)
+        for entry in given:
+            checked = _named(entry, any_model=info is None)
             place = "weights" if isinstance(checked, LeastSquares) else "search"
             if place in found:
                 raise ParameterError(
@@ -106,9 +106,9 @@ class MethodChoice:
         search = self.search if seed else replace(self.search, seed=0)
         default = MethodChoice()
         return {
-            one.name: vars(one)
-            for one, usual in ((search, default.search), (self.weights, default.weights))
-            if one != usual
+            settings.name: vars(settings)
+            for settings, usual in ((search, default.search), (self.weights, default.weights))
+            if settings != usual
         }
 
 

@@ -92,9 +92,9 @@ class Problem:
     def _refuse_of_one_model(self) -> None:
         """Refuse what names parameters of one model; all that are searched have a stiffness."""
         others = {
-            name: one
-            for name, one in self.parameters.items()
-            if name != "stiffness" or list(_stated(one)) != ["value"]
+            name: parameter
+            for name, parameter in self.parameters.items()
+            if name != "stiffness" or list(_stated(parameter)) != ["value"]
         }
         for name, value in (("parameters", others), ("constraints", self.constraints)):
             if value:
@@ -135,10 +135,10 @@ class Problem:
             Neither drive nor displacement of a record ever reverses.
         """
         held = {name for name, one in self.parameters.items() if one.value is not None}
-        for one, label in zip(self.records, self.labels, strict=True):
+        for record, label in zip(self.records, self.labels, strict=True):
             with of_record(label):
                 diagnostics.check_record(
-                    one.data, searches_hysteresis=bool(set(self.info.hysteresis) - held)
+                    record.data, searches_hysteresis=bool(set(self.info.hysteresis) - held)
                 )
 
     def settings(self) -> dict[str, Any]:
@@ -160,9 +160,9 @@ class Problem:
             {
                 name: as_plain_data(name, value)
                 for name, default in RECORD_DEFAULTS.items()
-                if (value := getattr(one, name)) != default
+                if (value := getattr(record, name)) != default
             }
-            for one in self.records
+            for record in self.records
         ]
 
     def content(self) -> list[Any]:

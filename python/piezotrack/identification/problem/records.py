@@ -145,15 +145,15 @@ def records_of(
             if value is not None and not (name == "offset" and value is True):
                 raise ParameterError(name, quoted(value), f"it in pt.Record, as {name}=")
     records = tuple(
-        one if isinstance(one, Record) else Record(one, **values)  # type: ignore[arg-type]
-        for one in given
+        entry if isinstance(entry, Record) else Record(entry, **values)  # type: ignore[arg-type]
+        for entry in given
     )
     datasets = [one.data for one in records]
-    for i, one in enumerate(datasets):
-        if one.drive_unit != datasets[0].drive_unit:
+    for i, dataset in enumerate(datasets):
+        if dataset.drive_unit != datasets[0].drive_unit:
             raise ParameterError(
-                f"the drive of {label_of(one, i)}",
-                f"in {one.drive_unit}",
+                f"the drive of {label_of(dataset, i)}",
+                f"in {dataset.drive_unit}",
                 f"{datasets[0].drive_unit}, as that of {label_of(datasets[0], 0)}",
                 argument="data",
             )
@@ -170,11 +170,11 @@ def _listed(data: object) -> list[Dataset | Record]:
         )
     if not data:
         raise ParameterError("data", "an empty list", "at least one Dataset")
-    for i, one in enumerate(data):
-        if not isinstance(one, (Dataset, Record)):
+    for i, entry in enumerate(data):
+        if not isinstance(entry, (Dataset, Record)):
             raise ParameterError(
                 "data",
-                f"a {type(data).__name__} whose record {i + 1} is {type(one).__name__}",
+                f"a {type(data).__name__} whose record {i + 1} is {type(entry).__name__}",
                 "a Dataset, as pt.read or pt.Dataset.from_frame make it, or a pt.Record",
             )
     return list(data)

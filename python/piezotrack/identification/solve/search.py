@@ -116,9 +116,9 @@ def _identification(
     constraints = tuple(Constraint(*one) for one in found.constraints)
     details: dict[str, Any] = {
         "parameters": {
-            one.name: _details(parameters[one.name])
-            for one in info.parameters
-            if one.name in parameters
+            parameter.name: _details(parameters[parameter.name])
+            for parameter in info.parameters
+            if parameter.name in parameters
         }
         | {"creep_weights": {"free": True}, "creep_times": {"free": False}},
         "delay": _details(parameters["delay"]) if "delay" in parameters else {},

@@ -120,8 +120,8 @@ def solve_least_squares(
     first = fitted[0]
     details: dict[str, Any] = {
         "parameters": {
-            one.name: {"free": one.name not in CHOSEN and one.held is None}
-            for one in info.parameters
+            parameter.name: {"free": parameter.name not in CHOSEN and parameter.held is None}
+            for parameter in info.parameters
         },
         "delay": {"free": True} if records[0].fits_delay else {},
         "fit": {
@@ -187,23 +187,23 @@ def _times(settings: LeastSquares, data: Dataset) -> list[float] | None:
     return decades[-MOST_RELAXATIONS:]
 
 
-def _fitted(model: Any, info: ModelInfo, one: Record, own: Mapping[str, Any]) -> FittedRecord:
+def _fitted(model: Any, info: ModelInfo, record: Record, own: Mapping[str, Any]) -> FittedRecord:
     """Return what was found of a record alone."""
-    data = one.data
+    data = record.data
     drift, offset = None, own["offset"]
     if own["drift"] is not None:
         amplitude, time = own["drift"]
         begin, end = float(data.t[0]), float(data.t[-1])
-        fitted = one.fits_drift_time
+        fitted = record.fits_drift_time
         drift = Drift(amplitude=amplitude, time=time, begin=begin, end=end, time_fitted=fitted)
         # What the sensor shows at rest at the end of the window.
         offset += amplitude * math.exp((begin - end) / time)
     return FittedRecord(
         data=data,
-        weight=one.weight,
+        weight=record.weight,
         delay=own["delay"],
         offset=offset,
-        offset_fitted=one.offset,
+        offset_fitted=record.offset,
         drift=drift,
         start=start_of_fit(data, own["history"], model._state._from(own["start"], info.state)),
         cost=own["rms"],

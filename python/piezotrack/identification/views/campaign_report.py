@@ -82,18 +82,18 @@ def _row(record: str, model: str, group: list[TaskResult]) -> tuple[str, ...]:
     if not found:
         return record, model, count, "-", "-", "-", "0", "no model"
     costs = [one.rms_percent for one in found]
-    kinds = ", ".join(sorted({one.kind or "" for one in found}))
+    models = ", ".join(sorted({one.kind or "" for one in found}))
     figures = (f"{value:.4g}" for value in (min(costs), median(costs), max(costs)))
-    return record, model, count, *figures, str(_agreeing(group)), kinds
+    return record, model, count, *figures, str(_agreeing(group)), models
 
 
 def _failed(campaign: Campaign) -> list[tuple[str, str]]:
     """Name the tasks without a model, and say why; seeds that failed alike in one line."""
     seeds: dict[tuple[str, str, str], list[str]] = {}
-    for one in campaign.failed:
-        alike = seeds.setdefault((one.record, one.model, one.error or ""), [])
-        if one.seed is not None:
-            alike.append(str(one.seed))
+    for task in campaign.failed:
+        alike = seeds.setdefault((task.record, task.model, task.error or ""), [])
+        if task.seed is not None:
+            alike.append(str(task.seed))
     return [
         (f"{record}, {model}" + (f", seed {', '.join(some)}" if some else ""), error)
         for (record, model, error), some in seeds.items()

@@ -63,28 +63,36 @@ def _records(fit: Identification) -> str:
     rows = [
         (
             f"{i + 1}",
-            f"{one.weight:g}",
-            f"{1e6 * one.cost:.4g}",
-            f"{one.cost_percent:.3g}",
+            f"{record.weight:g}",
+            f"{1e6 * record.cost:.4g}",
+            f"{record.cost_percent:.3g}",
             f"{1e6 * score.max_error:.4g}",
-            f"{1e6 * one.offset:.4g}",
-            f"{1e3 * one.delay:.4g}",
-            one.start.history if one.start else "",
+            f"{1e6 * record.offset:.4g}",
+            f"{1e3 * record.delay:.4g}",
+            record.start.history if record.start else "",
         )
-        for i, (one, score) in enumerate(zip(fit.records, fit.scores, strict=True))
+        for i, (record, score) in enumerate(zip(fit.records, fit.scores, strict=True))
     ]
     return words("Records", rows, heads).html()
 
 
-def _estimate(fit: Identification, name: str, one: Estimate) -> tuple[str, ...]:
-    if not one.free and one.tie is None:
+def _estimate(fit: Identification, name: str, estimate: Estimate) -> tuple[str, ...]:
+    if not estimate.free and estimate.tie is None:
         deviation = "held"
-    elif one.deviation is None:
+    elif estimate.deviation is None:
         deviation = "unknown"
     else:
-        deviation = f"{one.deviation:.2g}" if math.isfinite(one.deviation) else "no effect"
-    return name, one.symbol, f"{one.value:.6g}", one.unit, deviation + parameter_notes(fit, name)
+        deviation = (
+            f"{estimate.deviation:.2g}" if math.isfinite(estimate.deviation) else "no effect"
+        )
+    return (
+        name,
+        estimate.symbol,
+        f"{estimate.value:.6g}",
+        estimate.unit,
+        deviation + parameter_notes(fit, name),
+    )
 
 
-def _constraint(one: Constraint) -> str:
-    return one.text + (", active" if one.active else "")
+def _constraint(constraint: Constraint) -> str:
+    return constraint.text + (", active" if constraint.active else "")

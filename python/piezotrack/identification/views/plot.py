@@ -198,8 +198,8 @@ def plot_convergence(
     # A cost of 0 has no place on a logarithmic scale.
     shown = np.isfinite(search.history) & (search.history > 0.0)
     iterations = np.arange(search.history.size)[shown]
-    one = "swarm" if isinstance(fit.method, ParticleSwarm) else "descent"
-    best = f"best of {len(search.runs)} {one}s" if len(search.runs) > 1 else one
+    search_name = "swarm" if isinstance(fit.method, ParticleSwarm) else "descent"
+    best = f"best of {len(search.runs)} {search_name}s" if len(search.runs) > 1 else search_name
     ax.plot(
         iterations,
         1e6 * search.history[shown],
@@ -209,8 +209,8 @@ def plot_convergence(
     )
     ends = [(run.nit, 1e6 * run.cost) for run in search.runs if 0.0 < run.cost < np.inf]
     if len(ends) > 1:
-        refined = search.npolish and one == "swarm"
-        label = f"each {one}, refined" if refined else f"end of each {one}"
+        refined = search.npolish and search_name == "swarm"
+        label = f"each {search_name}, refined" if refined else f"end of each {search_name}"
         ax.plot(*zip(*ends, strict=True), **{**MARKS, "marker": "x", "label": label})
     if search.npolish and fit.cost > 0.0:
         least = fit.cost_um if search.cost_with_priors is None else 1e6 * search.cost_with_priors
@@ -342,16 +342,16 @@ def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
     count = len(fit.records)
     figure = panels(fig, (11.0, 4.6 * count + 3.0))
     parts = figure.subfigures(count + 1, 1, height_ratios=[4.6] * count + [3.0], squeeze=False)
-    for one, part in zip(fit.records, parts[:count, 0], strict=True):
-        if one.data is None:
+    for record, part in zip(fit.records, parts[:count, 0], strict=True):
+        if record.data is None:
             continue
-        run = fit.simulate(one.data, offset=one.offset)
+        run = fit.simulate(record.data, offset=record.offset)
         grid = part.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
-        plot_loop(one.data, run, part.add_subplot(grid[:, 0]))
+        plot_loop(record.data, run, part.add_subplot(grid[:, 0]))
         above = part.add_subplot(grid[0, 1])
         below = part.add_subplot(grid[1, 1], sharex=above)
-        plot_time(one.data, run, (above, below), stroke=one.stroke)
-        part.suptitle(what_was_fitted(fit, one), fontsize="large")
+        plot_time(record.data, run, (above, below), stroke=record.stroke)
+        part.suptitle(what_was_fitted(fit, record), fontsize="large")
     plot_convergence(fit, parts[count, 0].subplots())
     return whole(figure)
 

@@ -118,23 +118,23 @@ def _of_several(fit: Identification) -> list[str]:
         f"cost  {fit.cost_um:.4g} um rms of all = {fit.cost_percent:.3g} % of the largest stroke, "
         f"fit {fit.fit_percent:.4g} %",
     ]
-    for i, one in enumerate(fit.records):
-        if one.data is None:
+    for i, record in enumerate(fit.records):
+        if record.data is None:
             continue
-        said = f"{1e6 * one.cost:.4g} um rms = {one.cost_percent:.3g} % of its stroke"
-        said += "" if one.weight == 1.0 else f", weight {one.weight:g}"
-        said += f", offset {1e6 * one.offset:.5g} um fitted" if one.offset_fitted else ""
-        if "delay" in one.parameters:
-            said += f", delay {1e3 * one.delay:.4g} ms" + _spread(one.parameters["delay"])
-        elif one.delay:
-            said += f", delay {1e3 * one.delay:.4g} ms"
+        said = f"{1e6 * record.cost:.4g} um rms = {record.cost_percent:.3g} % of its stroke"
+        said += "" if record.weight == 1.0 else f", weight {record.weight:g}"
+        said += f", offset {1e6 * record.offset:.5g} um fitted" if record.offset_fitted else ""
+        if "delay" in record.parameters:
+            said += f", delay {1e3 * record.delay:.4g} ms" + _spread(record.parameters["delay"])
+        elif record.delay:
+            said += f", delay {1e3 * record.delay:.4g} ms"
         lines += [
-            f"  {i + 1:>2}  {one.data.source or 'unnamed'}, {_size(one.data)}",
+            f"  {i + 1:>2}  {record.data.source or 'unnamed'}, {_size(record.data)}",
             f"      {said}",
         ]
-        if one.drift:
-            lines.append(f"      {one.drift}")
-        if begun := start_notes(one.start, one.data):
+        if record.drift:
+            lines.append(f"      {record.drift}")
+        if begun := start_notes(record.start, record.data):
             lines.append(f"      it begins {begun}")
     return lines
 
@@ -200,16 +200,16 @@ def _values(fit: IdentifiedModel, parameters: Iterable[Parameter]) -> list[str]:
     """List the values of the parameters, lists of one length side by side in pairs."""
     lines, parts = ["parameters"], list(parameters)
     while parts:
-        one = parts.pop(0)
-        value = getattr(fit.model, one.name)
+        parameter = parts.pop(0)
+        value = getattr(fit.model, parameter.name)
         if value is None or value == ():
             continue
-        if not one.is_list:
-            unit, scale = _shown(fit, one)
-            row = f"  {one.name:<22}{one.symbol:<6}{scale * value:>12.6g}  {unit}"
+        if not parameter.is_list:
+            unit, scale = _shown(fit, parameter)
+            row = f"  {parameter.name:<22}{parameter.symbol:<6}{scale * value:>12.6g}  {unit}"
             lines.append(row.rstrip())
             continue
-        columns = [one]
+        columns = [parameter]
         if parts and parts[0].is_list and len(getattr(fit.model, parts[0].name)) == len(value):
             columns.append(parts.pop(0))
         lines += ["", "  " + "".join(f"{_heading(fit, column):>32}" for column in columns)]
@@ -219,19 +219,19 @@ def _values(fit: IdentifiedModel, parameters: Iterable[Parameter]) -> list[str]:
     return lines
 
 
-def _shown(fit: IdentifiedModel, one: Parameter) -> tuple[str, float]:
+def _shown(fit: IdentifiedModel, parameter: Parameter) -> tuple[str, float]:
     """Return the unit in which a parameter is shown, and the factor from SI."""
-    return shown_unit(of_drive(one.unit, fit.drive_unit))
+    return shown_unit(of_drive(parameter.unit, fit.drive_unit))
 
 
-def _heading(fit: IdentifiedModel, one: Parameter) -> str:
-    unit, _ = _shown(fit, one)
-    return f"{one.name} {one.symbol}" + (f" [{unit}]" if unit else "")
+def _heading(fit: IdentifiedModel, parameter: Parameter) -> str:
+    unit, _ = _shown(fit, parameter)
+    return f"{parameter.name} {parameter.symbol}" + (f" [{unit}]" if unit else "")
 
 
-def _scaled(fit: IdentifiedModel, one: Parameter) -> list[float]:
-    _, scale = _shown(fit, one)
-    return [scale * number for number in getattr(fit.model, one.name)]
+def _scaled(fit: IdentifiedModel, parameter: Parameter) -> list[float]:
+    _, scale = _shown(fit, parameter)
+    return [scale * number for number in getattr(fit.model, parameter.name)]
 
 
 def _runs(search: SearchRun, method: Descents | ParticleSwarm) -> list[str]:
@@ -405,14 +405,14 @@ def save_identification(
     name = fit.model.info.name if name is None else name
     until = None if shown is None else float(fit.data.t[-1])
     figures = {}
-    for i, one in enumerate(fit.records):
-        record = one.data if shown is None else shown
-        if record is None:
+    for i, record in enumerate(fit.records):
+        data = record.data if shown is None else shown
+        if data is None:
             continue
-        run = fit.simulate(record, offset=one.offset)
-        title = what_was_fitted(fit, one)
-        above, _ = plot_time(record, run, stroke=one.stroke, fitted_until=until, title=title)
-        figures[f"{name}_loop{_nth(i)}"] = plot_loop(record, run, title=title).figure
+        run = fit.simulate(data, offset=record.offset)
+        title = what_was_fitted(fit, record)
+        above, _ = plot_time(data, run, stroke=record.stroke, fitted_until=until, title=title)
+        figures[f"{name}_loop{_nth(i)}"] = plot_loop(data, run, title=title).figure
         figures[f"{name}_time{_nth(i)}"] = above.figure
     if fit.model.info.searched:
         figures[f"{name}_convergence"] = plot_convergence(fit, title=named(fit, fit.data)).figure

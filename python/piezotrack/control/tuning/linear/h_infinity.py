@@ -189,8 +189,8 @@ def _plant(linear: _core.LoopPlant, gain: float, dt: float) -> Matrices:
     rows, b, c, d, late = linear.matrices()
     a = np.array(rows, dtype=np.float64).reshape(len(b), len(b))
     states = sampled(a, np.array(b), np.array(c) / gain, d / gain, late, dt)
-    one, two, three, four = (np.atleast_2d(np.asarray(part, dtype=np.float64)) for part in states)
-    return one, two, three, four
+    ad, bd, cd, dd = (np.atleast_2d(np.asarray(part, dtype=np.float64)) for part in states)
+    return ad, bd, cd, dd
 
 
 def _designed(
@@ -250,17 +250,17 @@ def _toolbox() -> Any:
 def _bilinear(states: Matrices) -> Matrices:
     """Return a discrete system as a continuous one, by s = (z - 1)/(z + 1)."""
     a, b, c, d = states
-    one = np.eye(len(a))
-    inverse = np.linalg.inv(a + one)
+    identity = np.eye(len(a))
+    inverse = np.linalg.inv(a + identity)
     # Glover 1984, section 2: the factors share the root of 2.
     root = math.sqrt(2.0)
-    return (a - one) @ inverse, root * inverse @ b, root * c @ inverse, d - c @ inverse @ b
+    return (a - identity) @ inverse, root * inverse @ b, root * c @ inverse, d - c @ inverse @ b
 
 
 def _back(states: Matrices) -> Matrices:
     """Return a continuous system as the discrete one that it came from: z = (1 + s)/(1 - s)."""
     a, b, c, d = states
-    one = np.eye(len(a))
-    inverse = np.linalg.inv(one - a)
+    identity = np.eye(len(a))
+    inverse = np.linalg.inv(identity - a)
     root = math.sqrt(2.0)
-    return (one + a) @ inverse, root * inverse @ b, root * c @ inverse, d + c @ inverse @ b
+    return (identity + a) @ inverse, root * inverse @ b, root * c @ inverse, d + c @ inverse @ b
