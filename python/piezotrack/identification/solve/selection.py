@@ -50,6 +50,8 @@ OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
 # Share of the window that is fitted, and turns of the drive that each part needs; and the share
 # where it turns too seldom.
 FITTED, TURNS, FITTED_OF_ONE_LOOP = 0.6, 2, 0.75
+# Fewer samples are not parted.
+LEAST_SAMPLES = 100
 # A residual of so many times the noise, on what was not fitted, is good enough to try no more; one
 # of so many times is good enough to search none.
 AS_NOISE, NEAR_NOISE = 1.5, 2.0
@@ -329,6 +331,8 @@ def two_parts(data: Dataset) -> tuple[Dataset, Dataset, bool]:
         if before >= TURNS and after >= TURNS:
             middle = float(data.t[place])
             return data[data.t[0] : middle], data[middle:], False
+    if len(data) < LEAST_SAMPLES:
+        return data, data, True
     middle = float(data.t[int(FITTED_OF_ONE_LOOP * (len(data) - 1))])
     return data[data.t[0] : middle], data[middle:], True
 

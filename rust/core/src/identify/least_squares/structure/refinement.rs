@@ -8,7 +8,7 @@
 //! as Akaike's, would take every part.
 
 use super::lag::best_lag;
-use super::selection::{fitted_history, is_mode, nearer, unseen_mode, with_history};
+use super::selection::{fitted_history, nearer, with_history};
 use super::slow_parts::{creeps, with_drift};
 use super::trials::{Trial, settled_all, with_each};
 use crate::identify::least_squares::settings::{
@@ -258,12 +258,6 @@ impl Refinement<'_> {
         }
         if from.form != Form::First {
             ways.push(Box::new(move || best_lag(still)));
-        }
-        if !matches!(from.form, Form::Modes(_)) {
-            ways.push(Box::new(move || {
-                let hidden = unseen_mode(still)?;
-                Some(if is_mode(&hidden) { hidden } else { still.clone() })
-            }));
         }
         if let Form::Modes(count @ 2..) = from.form {
             ways.push(Box::new(move || {

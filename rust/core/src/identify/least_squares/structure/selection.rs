@@ -116,7 +116,20 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     refinement.refine(&mut fit, ROUNDS)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
-    Some(fit)
+    with_range_of_lags(fit, settings)
+}
+
+/// The fit with the smallest lag that explains the record as well, and the range of such lags.
+fn with_range_of_lags<'a>(mut fit: Fit<'a>, settings: &Settings) -> Option<Fit<'a>> {
+    fit.lags = None;
+    if settings.dynamics != DynamicsKind::Auto || matches!(fit.form, Form::Modes(_)) {
+        return Some(fit);
+    }
+    let mut still = fit.clone();
+    still.set_poles(Form::None, &[]);
+    still.settle(ROUGH)?;
+    let lagging = best_lag(&still)?;
+    smallest_lag(still, &lagging)
 }
 
 /// Fits of different structures, the first of each.
@@ -434,7 +447,7 @@ fn choose_dynamics(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option
 
 /// Whether what was found as a mode is one: far above the drive, where it does not stand for
 /// what else the record shows at the drive's harmonics.
-pub(super) fn is_mode(fit: &Fit<'_>) -> bool {
+fn is_mode(fit: &Fit<'_>) -> bool {
     let rates = fit.common.records.iter().map(|one| one.measures().frequency);
     let drive = rates.fold(0.0, f64::max) / core::f64::consts::TAU;
     let Some(slot) = fit.layout().poles().next() else { return false };
@@ -442,7 +455,7 @@ pub(super) fn is_mode(fit: &Fit<'_>) -> bool {
 }
 
 /// A mode that the record does not show: as high and as little damped as the record allows.
-pub(super) fn unseen_mode<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
+fn unseen_mode<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
     let dt = fit.common.shortest_interval();
     let beginnings = [(0.4, 0.1), (0.4, 1.0), (0.1, 0.1), (0.1, 1.0), (0.02, 1.0)];
     let trials = with_each(&beginnings, |(frequency, damping_ratio)| {
