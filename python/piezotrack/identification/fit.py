@@ -134,12 +134,13 @@ def identify(
         whose drive turns fewer than six times shows none: a loop that is not closed would look the
         same. Where it is not given: for models found by least squares what the record shows, for
         models that are searched none. Several records have drifts of their own.
-    history : {"virgin", "settled", "fit"}, optional
+    history : {"virgin", "settled", "fit", "rest"}, optional
         What the stage went through before the record, whose first sample finds it in equilibrium:
         nothing (``"virgin"``), the drive of the record once or more until the hysteresis repeats
         (``"settled"``), or a voltage that is fitted with the rest, V (``"fit"``), with the creep
-        that it left. Where it is not given, what the record shows: with more freedom only where
-        that lowers the cost by 2 %.
+        that it left. Or it was at rest at 0 V until the drive jumped to its first sample within one
+        interval (``"rest"``, of one record), which is then not judged. Where it is not given, what
+        the record shows: with more freedom only where that lowers the cost by 2 %.
     method : {"descents", "swarm"}, Descents, ParticleSwarm, LeastSquares or sequence, optional
         What searches: descents from random points until independent ones agree (the default), or
         a particle swarm; with settings, a seed and a number of independent runs. Of models that

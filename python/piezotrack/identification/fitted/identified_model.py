@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -47,6 +48,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = ["IdentifiedModel"]
+
+# A residual of so many times that of the fit is not explained by a simple history.
+EXPLAINED = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -299,7 +303,7 @@ class IdentifiedModel(Result):
             Added to the displacement [m]. ``"own"``: if an offset was fitted, the one that fits
             this record's window best, otherwise none; and if a drift was fitted, on another record
             one of its own with the same time constant.
-        history : {"virgin", "settled", "fit"}, optional
+        history : {"virgin", "settled", "fit", "rest"}, optional
             What the stage went through before the record; see `identify`. Where it is not given:
             of a record identified as it was there, of another one what that record shows.
         initial : StageState, optional
@@ -367,7 +371,7 @@ class IdentifiedModel(Result):
             The record, e.g. one that was not fitted.
         offset : float or "own", optional
             As in `simulate`.
-        history : {"virgin", "settled", "fit"}, optional
+        history : {"virgin", "settled", "fit", "rest"}, optional
             As in `simulate`.
         initial : StageState, optional
             As in `simulate`.
@@ -398,7 +402,7 @@ class IdentifiedModel(Result):
         ----------
         data : Dataset
             The record.
-        history : {"virgin", "settled", "fit"}, optional
+        history : {"virgin", "settled", "fit", "rest"}, optional
             As in `simulate`.
 
         Returns
@@ -412,7 +416,15 @@ class IdentifiedModel(Result):
         known = self.start if own is None else own.start
         if known and same_beginning(known, data) and history in (None, known.history):
             return known
-        return begin(self.model, data, history, self._residual, offset=self._fits_offset(data))
+        cost = self.details.get("fit", {}).get("cost", {}).get("value", math.inf)
+        return begin(
+            self.model,
+            data,
+            history,
+            self._residual,
+            offset=self._fits_offset(data),
+            enough=EXPLAINED * cost,
+        )
 
     def _residual(self, data: Dataset, state: StageState) -> Array:
         """Measured less simulated displacement in the window, without offset [m]."""

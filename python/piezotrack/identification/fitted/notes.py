@@ -229,6 +229,9 @@ def start_notes(start: Start | None, data: Dataset) -> str | None:
     unit, first = data.drive_unit, float(data.full.u[0])
     other = start.voltage
     came_from = "another drive" if other is None else drive_text(other, unit)
+    if start.history == "rest":
+        rest = drive_text(other or 0.0, unit)
+        return f"at rest at {rest} until the drive jumped to its first sample, {drive_text(first, unit)}"
     before = {
         "virgin": "never moved before",
         "settled": "settled under the record's own drive",
@@ -268,6 +271,13 @@ def lag_notes(lags: LagRange | None, frequency: float) -> list[str]:
     ]
 
 
+def carried_by_first_samples(rest: Array) -> bool:
+    """Return whether the first tenth of a residual carries more than half of its squares."""
+    squares = (rest - rest.mean()) ** 2
+    count = math.floor(FIRST * rest.size)
+    return count > 0 and bool(squares[:count].sum() >= CARRIED * squares.sum())
+
+
 def first_samples(rest: Array, data: Dataset) -> list[str]:
     """Say that the first samples carry the cost.
 
@@ -285,7 +295,7 @@ def first_samples(rest: Array, data: Dataset) -> list[str]:
     """
     squares = np.cumsum((rest - rest.mean()) ** 2)
     count = math.floor(FIRST * rest.size)
-    if count < 1 or squares[count - 1] < CARRIED * squares[-1]:
+    if not carried_by_first_samples(rest):
         return []
     # As far as the residual is well above that of the rest.
     later = (squares[-1] - squares[count - 1]) / (rest.size - count)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -32,13 +33,14 @@ __all__ = [
     "checked_history",
     "same_beginning",
     "start_after",
+    "start_at_jump",
     "start_entry",
     "start_of",
     "state_entry",
     "state_of",
 ]
 
-History = Literal["virgin", "settled", "fit"]
+History = Literal["virgin", "settled", "fit", "rest"]
 
 # A history with more freedom has to lower the rms of the residual by this share.
 GAIN = 0.02
@@ -57,13 +59,13 @@ class Start:
 
     Attributes
     ----------
-    history : {"virgin", "settled", "fit"}
-        What the stage went through before the record: nothing, the drive of the record, or a
-        voltage that was fitted.
+    history : {"virgin", "settled", "fit", "rest"}
+        What the stage went through before the record: nothing, the drive of the record, a voltage
+        that was fitted, or rest at 0 V until the drive jumped to its first sample.
     state : StageState
-        State at the first sample: in equilibrium.
+        State at the first sample: in equilibrium, but after such a jump.
     voltage : float or None
-        The voltage that was fitted [V].
+        The voltage that was fitted, or at which the stage was at rest [V].
     record : str
         Fingerprint of the beginning of the record.
     """
@@ -84,7 +86,7 @@ def checked_history(history: object) -> History | None:
 
     Returns
     -------
-    {"virgin", "settled", "fit"} or None
+    {"virgin", "settled", "fit", "rest"} or None
         The history; None where the record is to show it.
 
     Raises
@@ -219,7 +221,7 @@ def start_of_fit(data: Dataset, history: History, state: StageState) -> Start:
     ----------
     data : Dataset
         The record.
-    history : {"virgin", "settled", "fit"}
+    history : {"virgin", "settled", "fit", "rest"}
         What the stage went through before.
     state : StageState
         State at the first sample.
@@ -248,7 +250,7 @@ def start_after(
         The stage.
     data : Dataset
         The record.
-    history : {"virgin", "settled", "fit"}
+    history : {"virgin", "settled", "fit", "rest"}
         What it went through before.
     voltage : float, optional
         The voltage that it came from, for ``"fit"`` [V].
@@ -267,6 +269,27 @@ def start_after(
     if creeps and history == "settled" and len(getattr(state, "creep", ())):
         state = _repeating(model, data, state)
     return Start(history=history, state=state, voltage=voltage, record=fingerprint(data))
+
+
+def start_at_jump(model: Stage, data: Dataset) -> Start:
+    """State at the first sample of a record to which the drive jumped from 0 V within an interval.
+
+    Parameters
+    ----------
+    model : Stage
+        The stage, at rest at 0 V before.
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    Start
+        The start, not in equilibrium.
+    """
+    drive = [0.0, float(data.full.u[0])]
+    rest = model.equilibrium(0.0)
+    state = model.simulate(drive, data.dt, hold=data.hold, initial=rest).final
+    return Start(history="rest", state=state, voltage=0.0, record=fingerprint(data))
 
 
 def _repeating(model: Any, data: Dataset, state: Any) -> StageState:
@@ -299,6 +322,7 @@ def begin(
     residual: Callable[[Dataset, StageState], Array],
     *,
     offset: bool,
+    enough: float = math.inf,
 ) -> Start:
     """State of a stage at the first sample of a record, as the record shows it.
 
@@ -308,19 +332,24 @@ def begin(
         The stage.
     data : Dataset
         The record.
-    history : {"virgin", "settled", "fit"} or None
+    history : {"virgin", "settled", "fit", "rest"} or None
         What the stage went through before; None where the record is to show it.
     residual : callable
         Measured less simulated displacement in the window of a record [m], from a state at its
         first sample.
     offset : bool
         Whether a constant part of the residual is taken off.
+    enough : float, optional
+        Residual [m] up to which a virgin stage explains the record where a settled one does alike;
+        above it a voltage that the stage came from is fitted.
 
     Returns
     -------
     Start
         The start; without more freedom than the record needs.
     """
+    if history == "rest":
+        return start_at_jump(model, data)
     search = _Search(model, _beginning(data), residual, offset)
     if history == "fit":
         return replace(search.fitted(), record=fingerprint(data))
@@ -328,7 +357,7 @@ def begin(
         return start_after(model, data, history)
     virgin, settled = (start_after(model, search.data, one) for one in ("virgin", "settled"))
     best, rms = virgin, search.rms(virgin.state)
-    if not search.differ(virgin, settled, rms):
+    if not search.differ(virgin, settled, rms) and rms <= enough:
         return start_after(model, data, "virgin")
     if (other := search.rms(settled.state)) < (1.0 - GAIN) * rms:
         best, rms = settled, other

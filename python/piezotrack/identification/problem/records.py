@@ -44,7 +44,7 @@ class Record:
     drift : bool or float, optional
         Slow drift of the sensor along the record: none (False), with a time constant that the
         record shows (True), or with this one [s]; see `identify` for where it is not given.
-    history : {"virgin", "settled", "fit"}, optional
+    history : {"virgin", "settled", "fit", "rest"}, optional
         What the stage went through before the record; what the record shows where not given.
     weight : float, optional
         How much each of its samples counts beside those of the other records: only the ratios

@@ -10,6 +10,7 @@ from ...errors import Interrupted
 from ..fitted.start import GAIN
 from ..methods.least_squares import LeastSquares
 from .earlier_motion import earlier_motion
+from .jump import with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
 from .weights import solve_least_squares
@@ -51,6 +52,19 @@ def identify_model(
     ParameterError, DataError, NumericalError, Interrupted
         As for `identify`.
     """
+
+    def identify(other: Problem) -> Identification:
+        return _identify(other, method, run, start)
+
+    if any(record.history == "rest" for record in problem.records):
+        return with_rest(problem, identify)
+    fit = identify(problem)
+    return with_rest_tried(problem, fit, identify) if len(problem.records) == 1 else fit
+
+
+def _identify(
+    problem: Problem, method: Method, run: Run, start: Structure | None
+) -> Identification:
     if isinstance(method, LeastSquares):
         return _weights(problem, method, run, start)
     if len(problem.records) > 1:

@@ -64,7 +64,10 @@ class Structure:
         )
         main = (model.time_constant, model.frequency, model.damping_ratio)
         return cls(
-            histories=[one.start.history if one.start else "virgin" for one in fit.records],
+            histories=[
+                one.start.history if one.start and one.start.history != "rest" else "virgin"
+                for one in fit.records
+            ],
             drifts=[one.drift.time if one.drift else None for one in fit.records],
             creep_times=[time for weight, time in creep if weight > 0.0],
             dynamics=[*(one for one in main if one is not None), *chain(*modes)],
