@@ -28,6 +28,10 @@ pub(super) const FIRST_ROUNDS: usize = 1;
 /// Least gain of a move: less is chance, and the structure of the moves before stays.
 const LEAST_GAIN: f64 = 3e-3;
 
+/// Least gain of a drift in place of creep or the other way round: one explains a record as well as
+/// the other, but goes on otherwise, and which of them foretells a part has been found before.
+const EXCHANGE_GAIN: f64 = 0.05;
+
 /// Steps of a neighbour, how many of the best are settled, and how far above the cost so far these
 /// may be before.
 const FEW_STEPS: usize = 3;
@@ -94,17 +98,18 @@ impl Refinement<'_> {
         let mut tried = settled_all(&trials)?;
         tried.sort_by(|a, b| self.cost(a).total_cmp(&self.cost(b)));
         tried.truncate(SETTLED);
-        let mut least = self.cost(fit) - LEAST_GAIN;
-        tried.retain(|trial| self.cost(trial) < least + WITHIN);
+        let before = self.cost(fit);
+        tried.retain(|trial| self.cost(trial) < before + WITHIN);
         let settled = with_each(&tried, |trial| {
             let mut trial = trial.clone();
             trial.settle(ROUGH)?;
             Some(trial)
         })?;
-        let mut better = None;
+        let (mut least, mut better) = (before, None);
         for trial in settled {
             let cost = self.cost(&trial);
-            if cost < least {
+            let gain = if exchanges(fit, &trial) { EXCHANGE_GAIN } else { LEAST_GAIN };
+            if cost < least && cost < before - gain {
                 (least, better) = (cost, Some(trial));
             }
         }
@@ -286,6 +291,13 @@ fn decades(fit: &Fit<'_>) -> Vec<f64> {
     }
     times.reverse();
     times
+}
+
+/// Whether one fit has creep where the other has a drift.
+fn exchanges(fit: &Fit<'_>, other: &Fit<'_>) -> bool {
+    let drifts = |of: &Fit<'_>| of.drifts.iter().any(Option::is_some);
+    let creeps = |of: &Fit<'_>| !of.times.is_empty();
+    drifts(fit) != drifts(other) && creeps(fit) != creeps(other)
 }
 
 /// The fit with relaxations of these time constants, s, as good as it gets.
