@@ -31,6 +31,7 @@ ADVICE = [
     (r"\breference=, ", "--reference, ", "--reference"),
     (r"\bunstable=True", "--unstable", "--unstable"),
     (r"pt\.\w+\.from_um\(k[pq]=.*\)", "a value in V/um", "--kp"),
+    (r"\bmissing='(drop|fill)'", r"--missing \1", "--missing"),
     (r"\bcreep=False", "--creep none", "--creep"),
     (r"\bmodel='([\w-]+)'", r"--model \1", "--model"),
     (r"\bcount is (?=\d+: expected 1 to)", "--plays is ", "--plays"),
@@ -105,6 +106,8 @@ def as_options(text: str) -> str:
             text = re.sub(python, words, text)
     if "--resample" not in options:
         text = re.sub(r"; resample= puts it [^;]*", "", text)
+    if "--missing" not in options:
+        text = re.sub(r"; missing='drop' leaves .*", "", text)
     text = text.replace(", or largest_saturation=0.5 or more", "")
     for python, option, needed in ADVICE:
         if needed in options:

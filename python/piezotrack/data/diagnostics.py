@@ -99,7 +99,9 @@ would be 40 um if it is 1e6 too large, as um taken as m
     """
     if np.ptp(data.u) == 0.0 or np.ptp(data.y) == 0.0:
         return [*data.notes]
-    return [*data.notes, *_units(data), *_seldom(data), *_periods(data), *_clipping(data)]
+    notes = [*data.notes, *data.far_notes]
+    whole = data.without_far_readings()
+    return [*notes, *_units(whole), *_seldom(data), *_periods(whole), *_clipping(whole)]
 
 
 def fit_warnings(

@@ -217,6 +217,8 @@ class Identification(IdentifiedModel):
     def _notes_on(self, data: Dataset, one: FittedRecord, run: Response) -> list[str]:
         """Warnings about one of the records and the fit there."""
         notes, rest = diagnostics.record_warnings(data), data.y - run.x
+        if data.left_out is not None:
+            rest[data.left_out] = data.counted(rest).mean()
         if one.cost_percent > 5.0:
             notes.append(
                 "the model does not fit this record: the residual is "

@@ -84,7 +84,7 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
         found.append((Trial(info.name, info.title, score.rms), info))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
         if score.rms < AS_NOISE * noise and is_white(
-            rest.y - fit.simulate(rest, offset=fit.offset).x
+            rest.counted(rest.y - fit.simulate(rest, offset=fit.offset).x)
         ):
             break
     if not found:
@@ -136,7 +136,7 @@ def best_of_several(problem: Problem, methods: MethodChoice, run: Run) -> Identi
         try:
             fit = identify_model(first.of_model(info), of_trials.method(info), run)
             left = [
-                rest.y - fit.simulate(rest, offset=own.offset).x
+                rest.counted(rest.y - fit.simulate(rest, offset=own.offset).x)
                 for rest, own in zip(rests, fit.records, strict=True)
             ]
         except (DataError, NumericalError) as error:

@@ -168,12 +168,12 @@ impl<'a> Evaluator<'a> {
 
     /// Cost and offset with these shares of the creep, from sums over the whole window.
     pub(in crate::identify) fn costs_with(&self, sums: &ShareSums, shares: Shares) -> Costs {
-        self.residuals.costs(sums, Some(shares), self.record().window.len(), false)
+        self.residuals.costs(sums, Some(shares), self.record().samples(), false)
     }
 
     /// Cost, and shares of the creep, from sums over the whole window.
     pub(in crate::identify) fn share_cost(&self, sums: &ShareSums) -> ShareCost {
-        sums.cost(self.record().window.len(), self.problem.offset)
+        sums.cost(self.record().samples(), self.problem.offset)
     }
 }
 
