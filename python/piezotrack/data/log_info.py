@@ -16,6 +16,7 @@ from .._support.table import Column as Cells
 from .._support.table import Table
 from .._support.units import drive_text, drive_word, length_text, lookup
 from ..errors import DataError, ParameterError, PiezotrackError
+from .connections import unusual_connection
 from .drive_features import (
     DriveFeatures,
     TimeFeatures,
@@ -24,6 +25,7 @@ from .drive_features import (
     reversals_text,
     time_features,
 )
+from .far_readings import are_few, bridged, far_notes, far_readings
 from .formats import format_of
 from .missing import checked_missing, complete
 from .reader import USE_RESAMPLE, Log
@@ -309,8 +311,17 @@ def info(
         drive=found,
         stroke=stroke,
         determines=tuple(sentences),
-        notes=(*log.columns.notes, *lost),
+        notes=(*log.columns.notes, *lost, *_of_signals(t, u, y)),
     )
+
+
+def _of_signals(t: Array | None, u: Array | None, y: Array | None) -> list[str]:
+    """Say which readings are far off, and whether the displacement follows the drive."""
+    if t is None or u is None or y is None or not t.size == u.size == y.size:
+        return []
+    far = far_readings(u, y)
+    connection = unusual_connection(u, bridged(y, far) if are_few(far) else y)
+    return [*far_notes(t, y, far), *([] if connection is None else [connection.note])]
 
 
 def _attempts(given: Mapping[str, str | int | None]) -> list[dict[str, str | int | None]]:
