@@ -354,10 +354,10 @@ class Dataset(Viewed):
         >>> import piezotrack as pt
         >>> u = np.sin(np.arange(4000) / 300.0)
         >>> y = 20e-6 * u
-        >>> y[1500] += 30e-6
+        >>> y[471] += 30e-6
         >>> log = pt.Dataset(u=u, y=y, dt=0.001)
-        >>> f"{log.stroke * 1e6:.1f} um, {log.without_far_readings().stroke * 1e6:.1f} um"
-        '68.4 um, 40.0 um'
+        >>> f"{log.stroke * 1e6:.0f} um, {log.without_far_readings().stroke * 1e6:.0f} um"
+        '70 um, 40 um'
         """
         left_out, far = self.left_out, self.far
         if not far.any() or not are_few(far) or (left_out is not None and left_out[far].all()):
