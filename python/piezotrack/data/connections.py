@@ -41,7 +41,7 @@ TURN = 0.2
 
 
 class Connection(NamedTuple):
-    """What is unusual in how a displacement goes with its drive.
+    """Unusual way in which a displacement goes with its drive.
 
     Attributes
     ----------

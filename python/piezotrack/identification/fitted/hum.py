@@ -82,11 +82,11 @@ def hum_lines(rest: Array, u: Array, y: Array, dt: float) -> list[Line]:
     width = max(WANDERS, 2.0 / length)
     top = 0.45 / dt
     # A quick drive has lines of its own, further apart.
-    own = float(frequencies[int(np.argmax(driven))])
-    around = max(AROUND, 1.2 * own)
+    drive_frequency = float(frequencies[int(np.argmax(driven))])
+    around = max(AROUND, 1.2 * drive_frequency)
     best: list[Line] = []
     for mains in MAINS:
-        found: list[Line] = []
+        lines: list[Line] = []
         for k in range(1, HARMONICS + 1):
             place = k * mains
             reach = max(k * WANDERS, 2.0 / length)
@@ -100,20 +100,20 @@ def hum_lines(rest: Array, u: Array, y: Array, dt: float) -> list[Line]:
             if (
                 size**2 > STANDS_OUT * float(left[beside].max()) ** 2
                 and float(driven[here].max()) < DRIVEN * size
-                and not _is_harmonic(place, own, reach)
+                and not _is_harmonic(place, drive_frequency, reach)
             ):
-                found.append(Line(float(frequencies[at]), size))
+                lines.append(Line(float(frequencies[at]), size))
         # A harmonic alone may be a mode of the stage.
-        is_hum = any(line.frequency < 1.5 * mains for line in found)
-        if is_hum and power_of(found) > max(power_of(best), SHARE * power):
-            best = found
+        is_hum = any(line.frequency < 1.5 * mains for line in lines)
+        if is_hum and power_of(lines) > max(power_of(best), SHARE * power):
+            best = lines
     return best
 
 
-def _is_harmonic(place: float, own: float, reach: float) -> bool:
+def _is_harmonic(place: float, drive_frequency: float, reach: float) -> bool:
     """Whether a frequency is one of the first harmonics of a quick drive."""
-    order = round(place / own) if own > 0.0 else 0
-    return 1 <= order <= HARMONICS and abs(place - order * own) <= reach
+    order = round(place / drive_frequency) if drive_frequency > 0.0 else 0
+    return 1 <= order <= HARMONICS and abs(place - order * drive_frequency) <= reach
 
 
 def _amplitudes(values: Array, dt: float) -> tuple[Array, Array]:
