@@ -316,13 +316,14 @@ class IdentifiedModel(Result):
             Motion in the window; offset and delay are in its displacement, the rest is the
             stage's own. The delay is that of the record where it is one of those identified.
         """
+        expect("data", data, Dataset, "a Dataset")
+        data = data.without_far_readings()
         run = self._run(data, history, initial)
         drift, shift = self._added(data, run.x, offset)
         return replace(run, x=run.x + drift + shift)
 
     def _run(self, data: Dataset, history: History | None, initial: StageState | None) -> Response:
         """Response in the window of a record, as it is read but for an offset."""
-        expect("data", data, Dataset, "a Dataset")
         if data.drive_unit != (unit := self.drive_unit) and "m" in (unit, data.drive_unit):
             raise ParameterError(
                 "data",
@@ -352,7 +353,9 @@ class IdentifiedModel(Result):
         drift: Array | float = 0.0
         known = [self.start, *(one.start for one in self.records)]
         if self.drift and offset == "own" and not any(same_beginning(one, data) for one in known):
-            drift = self.drift.of_another(data.t, data.y - x, centred=self._fits_offset(data))
+            drift = self.drift.of_another(
+                data.t, data.y - x, centred=self._fits_offset(data), left_out=data.left_out
+            )
         return drift, self._shift(data, x + drift, offset)
 
     def score(
@@ -382,17 +385,19 @@ class IdentifiedModel(Result):
             Percentages refer to the stroke of the record identified: of one of several to its
             own, of another record to the largest.
         """
+        expect("data", data, Dataset, "a Dataset")
+        data = data.without_far_readings()
         x = self._run(data, history, initial).x
         drift, shift = self._added(data, x, offset)
-        error = data.y - x - drift - shift
+        error = data.counted(data.y - x - drift - shift)
         own = self._own(data)
         return Score(
             rms=float(np.sqrt(np.mean(error**2))),
             max_error=float(np.abs(error).max()),
             stroke=self.stroke if own is None else own.stroke,
             offset=shift,
-            spread=float(np.std(data.y)),
-            notes=tuple(self.extrapolation_notes(data.u, data.dt)),
+            spread=float(np.std(data.counted(data.y))),
+            notes=(*self.extrapolation_notes(data.u, data.dt), *data.far_notes),
         )
 
     def start_on(self, data: Dataset, *, history: History | None = None) -> Start:
@@ -411,6 +416,7 @@ class IdentifiedModel(Result):
             Its `state` is in equilibrium under the first sample of the drive.
         """
         expect("data", data, Dataset, "a Dataset")
+        data = data.without_far_readings()
         history = checked_history(history)
         own = self._own(data)
         known = self.start if own is None else own.start
@@ -458,7 +464,7 @@ class IdentifiedModel(Result):
             if not abs(shift) < LARGEST:
                 raise ParameterError("offset", shift, f"'own', or m below {LARGEST:g}")
             return shift
-        return float(np.mean(data.y - x)) if self._fits_offset(data) else 0.0
+        return float(np.mean(data.counted(data.y - x))) if self._fits_offset(data) else 0.0
 
     def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Loop, displacement with its error over time, and convergence of a search.

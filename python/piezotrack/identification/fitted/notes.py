@@ -82,9 +82,10 @@ def deviation_of(records: Sequence[tuple[Dataset, float]]) -> float:
         Of one record that of its displacement.
     """
     if len(records) == 1:
-        return float(records[0][0].y.std())
-    counts = np.array([weight * len(data) for data, weight in records])
-    squares = np.array([float(data.y.var()) for data, _ in records])
+        data = records[0][0]
+        return float(data.counted(data.y).std())
+    counts = np.array([weight * len(data.counted(data.y)) for data, weight in records])
+    squares = np.array([float(data.counted(data.y).var()) for data, _ in records])
     return math.sqrt(float(counts @ squares) / float(counts.sum()))
 
 
@@ -231,7 +232,8 @@ def start_notes(start: Start | None, data: Dataset) -> str | None:
     came_from = "another drive" if other is None else drive_text(other, unit)
     if start.history == "rest":
         rest = drive_text(other or 0.0, unit)
-        return f"at rest at {rest} until the drive jumped to its first sample, {drive_text(first, unit)}"
+        to = drive_text(first, unit)
+        return f"at rest at {rest} until the drive jumped to its first sample, {to}"
     before = {
         "virgin": "never moved before",
         "settled": "settled under the record's own drive",

@@ -204,7 +204,7 @@ def start_of(entry: Any, state: type[StageState]) -> Start | None:
 def fingerprint(data: Dataset) -> str:
     """Fingerprint of the beginning of a record, the same for all windows with warm-up."""
     digest = hashlib.sha256()
-    for part in (data.dt, data.full.u[:KNOWN_BY], data.full.y[:KNOWN_BY]):
+    for part in (data.dt, data.full.u[:KNOWN_BY], data.full.recorded[:KNOWN_BY]):
         digest.update(np.asarray(part, dtype="<f8").tobytes())
     return digest.hexdigest()
 
@@ -386,13 +386,13 @@ class _Search:
     offset: bool
 
     def rms(self, state: StageState) -> float:
-        rest = self.residual(self.data, state)
+        rest = self.data.counted(self.residual(self.data, state))
         return float(np.std(rest) if self.offset else np.sqrt(np.mean(rest**2)))
 
     def differ(self, start: Start, other: Start, rms: float) -> bool:
         """Whether two starts differ by what the record shows."""
         gap = self.residual(self.data, start.state) - self.residual(self.data, other.state)
-        return float(np.std(gap)) > SHOWS * rms
+        return float(np.std(self.data.counted(gap))) > SHOWS * rms
 
     def fitted(self) -> Start:
         """Start from the voltage that fits the record best."""
@@ -412,12 +412,13 @@ class _Search:
     def from_voltage(self, volts: float) -> tuple[Start, float]:
         """Start from a voltage, its creep where it fits best, and the rms of the residual."""
         start = start_after(self.model, self.data, "fit", float(volts))
-        rest = self.residual(self.data, start.state)
+        rest = self.data.counted(self.residual(self.data, start.state))
         weights = np.array(getattr(self.model, "creep_weights", ()))
         used = weights > 0.0
         columns = [np.ones(rest.size)] if self.offset else []
         if used.any():
-            t = self.data.dt * np.arange(len(self.data.full))[self.data.warmup :]
+            t = self.data.dt * np.arange(len(self.data.full), dtype=np.float64)
+            t = self.data.counted(t[self.data.warmup :])
             with np.errstate(over="ignore"):
                 columns += [np.exp(-t / time) for time in np.array(self.model.creep_times)[used]]
         if columns:

@@ -51,10 +51,10 @@ def with_rest_tried(
     if record.history is not None or data.warmup or not _may_jump(data):
         return fit
     run = fit.simulate(data, offset=fit.offset)
-    if not carried_by_first_samples(data.y - run.x):
+    if not carried_by_first_samples(data.counted(data.y - run.x)):
         return fit
     jumped = with_rest(problem, identify)
-    left = fit.simulate(jumped.data, offset=fit.offset).x - jumped.data.y
+    left = jumped.data.counted(fit.simulate(jumped.data, offset=fit.offset).x - jumped.data.y)
     before = float(np.sqrt(np.mean(left**2)))
     return jumped if jumped.cost < (1.0 - GAIN) * before else fit
 
@@ -100,9 +100,11 @@ def _may_jump(data: Dataset) -> bool:
 def _at_rest_before(record: Record) -> Record:
     """Put a sample of 0 V before a record, which is warm-up as its first one is."""
     data, full = record.data, record.data.full
+    y = full.y if full.left_out is None else np.where(full.left_out, np.nan, full.y)
     before = Dataset(
         u=np.concatenate(([0.0], full.u)),
-        y=np.concatenate((full.y[:1], full.y)),
+        y=np.concatenate((full.y[:1], y)),
+        missing="drop",
         dt=data.dt,
         hold=data.hold,
         drive_unit=data.drive_unit,

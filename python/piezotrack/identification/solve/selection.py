@@ -170,9 +170,10 @@ class _Trials:
         self.found.append(Tried(trial, info, ill, start))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
         noise = np.array([max(sample_noise(rest.y), repeated(rest)) for rest in self.rests])
-        plain = np.array([math.sqrt(float(np.mean(one**2))) for one in left])
+        counted = [rest.counted(one) for rest, one in pairs]
+        plain = np.array([math.sqrt(float(np.mean(one**2))) for one in counted])
         self.least = min(self.least, float(np.max(plain / np.maximum(noise, 1e-300))))
-        return bool(np.all(plain < AS_NOISE * noise)) and all(is_white(one) for one in left)
+        return bool(np.all(plain < AS_NOISE * noise)) and all(is_white(one) for one in counted)
 
 
 def judged(data: Dataset, left: Array) -> float:
@@ -194,13 +195,17 @@ def judged(data: Dataset, left: Array) -> float:
     # Parts of blocks at the ends differ in amplitude by chance.
     blocks = [slice(a, b) for a, b in pairwise(turns)]
     if len(blocks) < 2:
-        return float(np.mean(left**2))
+        return float(np.mean(data.counted(left) ** 2))
+    if data.left_out is not None:
+        left = np.where(data.left_out, np.nan, left)
     size = np.array([np.ptp(data.u[block]) for block in blocks])
     rate = size / np.array([block.stop - block.start for block in blocks])
     classes: dict[tuple[bool, bool], list[slice]] = {}
     for block, large, fast in zip(blocks, _upper(size), _upper(rate), strict=True):
         classes.setdefault((bool(large), bool(fast)), []).append(block)
-    means = [np.mean(np.concatenate([left[one] for one in some]) ** 2) for some in classes.values()]
+    means = [
+        np.nanmean(np.concatenate([left[one] for one in some]) ** 2) for some in classes.values()
+    ]
     return float(np.mean(means))
 
 
