@@ -430,6 +430,7 @@ class IdentifiedModel(Result):
             self._residual,
             offset=self._fits_offset(data),
             enough=EXPLAINED * cost,
+            reached=self.drive_range,
         )
 
     def _residual(self, data: Dataset, state: StageState) -> Array:

@@ -323,6 +323,7 @@ def begin(
     *,
     offset: bool,
     enough: float = math.inf,
+    reached: tuple[float, float] | None = None,
 ) -> Start:
     """State of a stage at the first sample of a record, as the record shows it.
 
@@ -342,6 +343,8 @@ def begin(
     enough : float, optional
         Residual [m] up to which a virgin stage explains the record where a settled one does alike;
         above it a voltage that the stage came from is fitted.
+    reached : (float, float), optional
+        Voltages that the stage has been at elsewhere [V], from which it may have come too.
 
     Returns
     -------
@@ -350,7 +353,7 @@ def begin(
     """
     if history == "rest":
         return start_at_jump(model, data)
-    search = _Search(model, _beginning(data), residual, offset)
+    search = _Search(model, _beginning(data), residual, offset, reached or (math.inf, -math.inf))
     if history == "fit":
         return replace(search.fitted(), record=fingerprint(data))
     if history is not None:
@@ -384,6 +387,7 @@ class _Search:
     data: Dataset
     residual: Callable[[Dataset, StageState], Array]
     offset: bool
+    reached: tuple[float, float]
 
     def rms(self, state: StageState) -> float:
         rest = self.data.counted(self.residual(self.data, state))
@@ -398,7 +402,8 @@ class _Search:
         """Start from the voltage that fits the record best."""
         low, high = float(self.data.full.u.min()), float(self.data.full.u.max())
         reach = 0.5 * (high - low)
-        grid = np.linspace(low - reach, high + reach, GRID)
+        ends = min(low - reach, self.reached[0]), max(high + reach, self.reached[1])
+        grid = np.linspace(*ends, GRID)
         costs = [self.from_voltage(volts)[1] for volts in grid]
         best = int(np.argmin(costs))
         left, right = grid[max(best - 1, 0)], grid[min(best + 1, GRID - 1)]

@@ -55,8 +55,13 @@ impl Refinement<'_> {
     pub fn cost(&self, fit: &Fit<'_>) -> f64 {
         let mut cost = libm::log(fit.rms);
         for (r, record) in fit.common.records.iter().enumerate() {
-            if record.history.is_none() && fit.begins[r].history != History::Virgin {
-                cost += HISTORY_GAIN;
+            // Each history with more freedom has to take its share away.
+            if record.history.is_none() {
+                cost += match fit.begins[r].history {
+                    History::Virgin => 0.0,
+                    History::Settled => HISTORY_GAIN,
+                    History::Fitted => 2.0 * HISTORY_GAIN,
+                };
             }
             if record.drift == DriftKind::Auto && fit.drifts[r].is_some() {
                 cost += DRIFT_GAIN;

@@ -34,9 +34,8 @@ const ABOVE_DRIVE: f64 = 10.0;
 /// Share of the deviation that dead zones in other places have to take away.
 const CORNER_GAIN: f64 = 0.02;
 
-/// Rows that choices are made on, about; more where modes ring.
-const ROWS: usize = 1500;
-const EXCITED_ROWS: usize = 4000;
+/// Rows that choices are made on, about.
+const ROWS: usize = 4000;
 
 /// Longest interval of a thinned record, as a phase of the drive, rad: its peaks are then known to
 /// a thousandth of the travel.
@@ -81,10 +80,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         NodesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
     };
     let mut fit = Fit::new(common, &nodes);
-    let every = |one: &WeightsRecord<'_>| {
-        let rows = if one.measures().excited().is_some() { EXCITED_ROWS } else { ROWS };
-        one.samples().div_ceil(rows)
-    };
+    let every = |one: &WeightsRecord<'_>| one.samples().div_ceil(ROWS);
     fit.every = common.records.iter().map(every).collect();
     fit.settle(ROUGH)?;
     search_shape(&mut fit)?;
