@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.data.connections import unusual_connection
-from piezotrack.data.diagnostics import record_warnings
+from piezotrack.data.checks.connections import unusual_connection
+from piezotrack.data.checks.diagnostics import record_warnings
 
 if TYPE_CHECKING:
     from pathlib import Path

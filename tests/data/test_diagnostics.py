@@ -11,7 +11,7 @@ import pytest
 
 import piezotrack as pt
 from folders import MEASURED
-from piezotrack.data import diagnostics
+from piezotrack.data.checks import diagnostics
 from piezotrack.xu_li_2010.demo import demo_log
 from records import BOX, HELD, quick
 from virtual import changed

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.identification.fitted.hum import hum_lines
+from piezotrack.data.checks.hum import hum_lines
 
 RATE = 1000.0
 T = np.arange(4000) / RATE

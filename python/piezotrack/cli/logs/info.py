@@ -37,7 +37,7 @@ def info_command(
     record can determine.
     """
     from ..._support.files.writing import json_ready
-    from ...data.log_info import info
+    from ...data.checks.log_info import info
     from ..advice import as_options
 
     columns = Columns(time, drive, displacement, unit, dt)

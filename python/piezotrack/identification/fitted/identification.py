@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ..._support.statistics import sample_noise
-from ...data import diagnostics
-from ...data.connections import unusual_connection
+from ...data.checks import diagnostics
+from ...data.checks.connections import unusual_connection
+from ...data.checks.hum import hum_lines, hum_notes, power_of
 from ..methods.descents import Descents
 from ..methods.particle_swarm import ParticleSwarm
 from .fitted_record import FittedRecord
-from .hum import hum_lines, hum_notes, power_of
 from .identified_model import IdentifiedModel
 from .notes import above_noise, deviation_of, drift_notes, first_samples, fit_percent, lag_notes
 

@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.arrays import check_dt, time_fault
-from .._support.display.table import Column as Cells
-from .._support.display.table import Table
-from .._support.messages import quoted
-from .._support.units import drive_text, drive_word, length_text, lookup
-from ..errors import DataError, ParameterError, PiezotrackError
+from ..._support.arrays import check_dt, time_fault
+from ..._support.display.table import Column as Cells
+from ..._support.display.table import Table
+from ..._support.messages import quoted
+from ..._support.units import drive_text, drive_word, length_text, lookup
+from ...errors import DataError, ParameterError, PiezotrackError
+from ..far_readings import are_few, bridged, far_notes, far_readings
+from ..formats import format_of
+from ..missing import checked_missing, complete
+from ..reader import USE_RESAMPLE, Log
 from .connections import unusual_connection
 from .drive_features import (
     DriveFeatures,
@@ -25,10 +29,6 @@ from .drive_features import (
     reversals_text,
     time_features,
 )
-from .far_readings import are_few, bridged, far_notes, far_readings
-from .formats import format_of
-from .missing import checked_missing, complete
-from .reader import USE_RESAMPLE, Log
 
 if TYPE_CHECKING:
     import os
@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .columns import Column
-    from .missing import Missing
+    from ..columns import Column
+    from ..missing import Missing
 
     Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .. import _core
-from .._support.statistics import sample_noise
+from ... import _core
+from ..._support.statistics import sample_noise
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import _core
-from .._support.units import best_length_unit, drive_text, length_text
-from ..errors import DataError
+from ... import _core
+from ..._support.units import best_length_unit, drive_text, length_text
+from ...errors import DataError
 from .connections import unusual_connection
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .dataset import Dataset
+    from ..dataset import Dataset
 
     Array = NDArray[np.float64]
 
