@@ -132,20 +132,18 @@ pub(super) fn choose_nodes(fit: &mut Fit<'_>, settings: &Settings) -> Option<()>
     };
     let found: Option<Vec<_>> =
         on_all_threads(tried(fit.common.of.nodes()), &trials).into_iter().collect();
-    let mut least = (1.0 - PLAYS_GAIN) * foretold(&here);
-    let mut best = None;
-    for (rms, nodes) in found?.into_iter().flatten() {
-        if rms < least {
-            least = (1.0 - PLAYS_GAIN) * rms;
-            best = Some(nodes);
-        }
-    }
-    if let Some(thresholds) = best {
+    let least = (1.0 - PLAYS_GAIN) * foretold(&here);
+    let mut better: Vec<(f64, Vec<f64>)> =
+        found?.into_iter().flatten().filter(|(rms, _)| *rms < least).collect();
+    better.sort_by(|one, other| one.0.total_cmp(&other.0));
+    for (_, nodes) in better {
         let mut trial = fit.clone();
-        trial.restructure(|trial| trial.nodes = thresholds);
+        trial.restructure(|trial| trial.nodes = nodes);
         trial.settle(ROUGH)?;
+        // What foretells the last third has to explain all of the window too.
         if trial.rms < SAME * fit.rms {
             *fit = trial;
+            break;
         }
     }
     Some(())

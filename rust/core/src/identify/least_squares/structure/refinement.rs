@@ -25,6 +25,9 @@ use crate::signal::range;
 pub(super) const ROUNDS: usize = 4;
 pub(super) const FIRST_ROUNDS: usize = 1;
 
+/// Share of the stroke below which no sensor shows a deviation.
+const UNSEEN: f64 = 1e-6;
+
 /// Least gain of a move: less is chance, and the structure of the moves before stays.
 const LEAST_GAIN: f64 = 3e-3;
 
@@ -39,9 +42,9 @@ const SETTLED: usize = 2;
 const WITHIN: f64 = 0.2;
 
 /// Ratios by which time constants of the creep are moved.
-const RATIOS: [f64; 2] = [3.0, 1.5];
+const RATIOS: [f64; 3] = [3.0, 1.5, 1.2];
 
-/// What a refinement is about.
+/// Refinement of a fit with some settings.
 pub(super) struct Refinement<'s> {
     pub settings: &'s Settings,
     /// Whether a mode was shown by a record.
@@ -53,7 +56,7 @@ type Way<'t, 'a> = Box<dyn Fn() -> Option<Fit<'a>> + Sync + 't>;
 impl Refinement<'_> {
     /// Penalised cost: logarithm of the RMS deviation and of what each part has to take away.
     pub fn cost(&self, fit: &Fit<'_>) -> f64 {
-        let mut cost = libm::log(fit.rms);
+        let mut cost = libm::log(fit.rms + UNSEEN * fit.common.stroke);
         for (r, record) in fit.common.records.iter().enumerate() {
             // Each history with more freedom has to take its share away.
             if record.history.is_none() {
