@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .identification.problem.problem import Problem
+from .identification.solve.weights import Structure
 
 __all__ = [
     "Checkpoint",
@@ -548,6 +549,7 @@ def identify_weights(
     zones: int,
     creep_times: Sequence[float] | None,
     dynamics: str,
+    start: Structure | None,
     threads: int,
 ) -> LeastSquaresFit: ...
 def resonances(

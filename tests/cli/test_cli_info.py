@@ -94,3 +94,21 @@ def test_other_commands_take_every_format() -> None:
     write_model()
     ran("simulate", "dahl.json", "log.mat", "--out", "run")
     assert len(pt.read("run/simulated.csv")) == 1001
+
+
+def test_missing_readings_are_refused_with_the_option_that_takes_them() -> None:
+    lines = log_text().splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith("time")) + 1
+    for k in range(first + 300, first + 310):
+        lines[k] = ",".join([*lines[k].split(",")[:2], ""])
+    write("lost.csv", "\n".join(lines) + "\n")
+    for command in (("info",), ("identify", "--model", "prandtl-ishlinskii")):
+        said = run(command[0], "lost.csv", *command[1:])
+        assert "--missing drop" in said.stdout + said.stderr
+    assert "10 of 1001" in ran("info", "lost.csv", "--missing", "drop")
+    ran("convert", "lost.csv", "dropped.npz", "--missing", "drop")
+    ran("convert", "lost.csv", "filled.npz", "--missing", "fill")
+    assert np.isnan(pt.read("dropped.npz", missing="drop").recorded).sum() == 10
+    assert pt.read("filled.npz").left_out is None
+    # A command without the option does not name it.
+    assert "--missing" not in refusal("noise", "lost.csv")

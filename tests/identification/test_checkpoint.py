@@ -18,7 +18,6 @@ import pytest
 import piezotrack as pt
 from commands import ran, refusal
 from piezotrack.data.log_file import write_log
-from records import search_of
 
 DT = 1e-3
 
@@ -33,8 +32,9 @@ def record(seed: int = 0, count: int = 2000) -> pt.Dataset:
 
 def found(fit: pt.identification.Identification) -> Any:
     """All that a search says."""
-    search = search_of(fit)
-    return fit.document(), search.history.tolist(), search.runs, fit.nfev, search.npolish
+    search = fit.search
+    course = search and (search.history.tolist(), search.runs, search.npolish)
+    return fit.document(), course, fit.nfev
 
 
 def interrupted(path: Path, after: int, log: pt.Dataset | None = None, **settings: Any) -> bool:

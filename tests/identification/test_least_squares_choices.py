@@ -40,6 +40,7 @@ def fitted(
         "zones": 0,
         "creep_times": [],
         "dynamics": "none",
+        "start": None,
         "threads": 0,
     }
     return _core.identify_weights(Problem(model=model, records=(one,)), **settings | given)

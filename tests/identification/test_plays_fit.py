@@ -155,8 +155,9 @@ def test_each_part_of_the_model_earns_its_place() -> None:
     late = fit_plays(training, drift=False, count=10, dead_zones=False)
     bent = fit_plays(training, count=10, drift=False)
     crept = fit_plays(training, count=10, drift=False, creep=True)
-    # Thresholds of dead zones are found in a problem with several minima: to a hundredth. Of the
-    # lags that fit within 0.3 % of the cost the least is taken.
-    assert crept.cost < 1.015 * bent.cost
+    # Thresholds of dead zones are found in a problem with several minima: to a hundredth. A history
+    # that takes less than 2 % of the deviation away is left. Of the lags that fit within 0.3 % of
+    # the cost the least is taken.
+    assert crept.cost < 1.035 * bent.cost
     assert bent.cost < late.cost < 1.005 * alone.cost
     assert alone.score(tracking).rms > late.score(tracking).rms > bent.score(tracking).rms

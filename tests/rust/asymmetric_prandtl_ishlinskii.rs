@@ -289,6 +289,7 @@ fn a_record_gives_back_the_stage_that_made_it() {
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::None,
+            start: None,
         };
         let model = Model::AsymmetricPrandtlIshlinskii;
         let fit = identify_weights(model, &[record], &settings, NEVER).unwrap().unwrap();

@@ -261,6 +261,7 @@ fn a_fit_finds_what_the_record_was_made_with() {
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::None,
+            start: None,
         };
         let fit = identify_weights(Model::Duhem, &[record], &settings, NEVER).unwrap().unwrap();
         assert!(fit.rms < 1e-9, "{:e}", fit.rms);

@@ -273,6 +273,7 @@ fn settings() -> WeightsSettings {
         zones: 0,
         creep: CreepKind::Times(vec![]),
         dynamics: DynamicsKind::None,
+        start: None,
     }
 }
 

@@ -184,6 +184,7 @@ fn a_fit_finds_what_the_record_was_made_with() {
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::None,
+            start: None,
         };
         let model = Model::PolynomialPrandtlIshlinskii;
         let fit = identify_weights(model, &[record], &settings, NEVER).unwrap().unwrap();

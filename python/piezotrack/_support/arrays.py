@@ -172,9 +172,17 @@ def real_array(name: str, values: object) -> Array:
 
 
 def signal_of(
-    name: str, values: ArrayLike | None, *, like: Array | None = None, finite: bool = True
+    name: str,
+    values: ArrayLike | None,
+    *,
+    like: Array | None = None,
+    finite: bool = True,
+    remedy: str = "",
 ) -> Array:
-    """Return a read-only float64 copy of one-dimensional `values`, as long as `like`."""
+    """Return a read-only float64 copy of one-dimensional `values`, as long as `like`.
+
+    `remedy` is said to a value that is NaN.
+    """
     array = real_array(name, values)
     if array.ndim != 1:
         raise ShapeError(name, f"the shape {array.shape}", "one dimension")
@@ -184,6 +192,7 @@ def signal_of(
     if finite and (bad := _first(~(np.abs(signal) < LARGEST))) is not None:
         value = signal[bad]
         expected = f"numbers below {LARGEST:g}" if np.isfinite(value) else "finite numbers"
-        raise DataError(f"{name} is {value} at sample {bad}: expected {expected}")
+        remedy = remedy if np.isnan(value) else ""
+        raise DataError(f"{name} is {value} at sample {bad}: expected {expected}{remedy}")
     signal.setflags(write=False)
     return signal

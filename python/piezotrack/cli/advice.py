@@ -38,6 +38,7 @@ REMEDIES = [
     (r"units=\{'?(\w+)'?: \.\.\.\}", r"--unit \1=...", "--unit"),
     (r"\bin parameters=", "by --fix", "--fix"),
     (r"pt\.\w+\.from_um\(k[pq]=.*\)", "a value in V/um", "--kp"),
+    (r"\bmissing='(drop|fill)'", r"--missing \1", "--missing"),
     (r"\bcreep=False", "--creep none", "--creep"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
 ]
@@ -91,6 +92,8 @@ def as_options(said: object) -> str:
             text = re.sub(python, words, text)
     if "--resample" not in known:
         text = re.sub(r"; resample= puts it [^;]*", "", text)
+    if "--missing" not in known:
+        text = re.sub(r"; missing='drop' leaves .*", "", text)
     text = text.replace(", or largest_saturation=0.5 or more", "")
     for python, words, needed in REMEDIES:
         if needed in known:

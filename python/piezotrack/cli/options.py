@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from ..data.dataset import Dataset, Hold
+    from ..data.missing import Missing
 
 __all__ = [
     "Columns",
@@ -28,6 +29,7 @@ __all__ = [
     "Jitter",
     "Json",
     "LogFile",
+    "MissingOption",
     "ModelFile",
     "Out",
     "OutFile",
@@ -86,6 +88,13 @@ Resample = Annotated[
         help="Put a log with gaps or jitter on even times, at this interval in s; default not."
     ),
 ]
+MissingOption = Annotated[
+    Literal["drop", "fill"] | None,
+    typer.Option(
+        help="Missing readings (NaN): left out of what is fitted and judged (drop) or on straight "
+        "lines (fill); default refused."
+    ),
+]
 HoldOption = Annotated[
     Literal["foh", "zoh"],
     typer.Option(help="Drive between samples: linear (foh) or constant (zoh)."),
@@ -130,7 +139,13 @@ class Columns:
         self.units = {column(name) or name: text for name, text in pairs("--unit", unit)}
         self.dt = dt
 
-    def read(self, file: Path, hold: Hold, resample: float | None = None) -> Dataset:
+    def read(
+        self,
+        file: Path,
+        hold: Hold,
+        resample: float | None = None,
+        missing: Missing = None,
+    ) -> Dataset:
         """Read a log with these columns."""
         from ..data.reader import read
 
@@ -143,6 +158,7 @@ class Columns:
             dt=self.dt,
             resample=resample,
             hold=hold,
+            missing=missing,
         )
 
     def read_drive(self, file: Path) -> Dataset:

@@ -21,6 +21,8 @@ from .dataset_arguments import (
     interpolation_factor,
     window_samples,
 )
+from .far_readings import are_few, bridged, far_notes, far_readings
+from .missing import USE_MISSING, checked_missing, complete, thinned
 
 if TYPE_CHECKING:
     import os
@@ -30,8 +32,10 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from .frames import Frame
+    from .missing import Missing
 
     Array = NDArray[np.float64]
+    Mask = NDArray[np.bool_]
 
 __all__ = ["Dataset", "Hold"]
 
@@ -65,6 +69,12 @@ class Dataset(Viewed):
         Where the record comes from, e.g. the name of a file.
     notes : sequence of str, optional
         What a person should know of its source, as that a unit is not the one of the file.
+    missing : {"drop", "fill"}, optional
+        What becomes of readings that are NaN. ``"drop"``: the samples stay, because the stage
+        moves on through them, but their displacement does not count in a fit or a score.
+        ``"fill"``: it counts as on the straight line between the readings beside. A drive that is
+        missing is on such a line in both cases, or constant with ``"zoh"``. `notes` has how
+        many. They are refused where it is not given.
 
     Raises
     ------
@@ -118,22 +128,32 @@ class Dataset(Viewed):
         column_units: Mapping[str, str] | None = None,
         source: str | None = None,
         notes: Sequence[str] = (),
+        missing: Missing = None,
     ) -> None:
         one_of("hold", hold, ("foh", "zoh"))
         for name, text in (("drive_unit", drive_unit), ("source", source or "")):
             if not isinstance(text, str):
                 raise ParameterError(name, quoted(text), "text")
         # The arrays hold the warm-up and the window, which begins at sample `_start`.
-        self._u = signal_of("u", u)
-        self._y = signal_of("y", y, like=self._u)
+        finite = checked_missing(missing) is None
+        self._u = signal_of("u", u, finite=finite, remedy=USE_MISSING)
+        self._y = signal_of("y", y, like=self._u, finite=finite, remedy=USE_MISSING)
+        filled = complete(self._u, self._y, missing, constant=hold == "zoh")
+        # Displacement as it was read, where it does not count everywhere.
+        self._left_out, self._recorded = filled.left_out, None
+        if self._left_out is not None:
+            self._recorded = signal_of("y", np.where(self._left_out, np.nan, self._y), finite=False)
+        if not finite:
+            self._u, self._y = signal_of("u", filled.u), signal_of("y", filled.y)
         if self._u.size < MIN_SAMPLES:
             raise DataError(f"u has {self._u.size} samples: expected at least {MIN_SAMPLES}")
         self._t, self._dt = time_axis(t, dt, self._u)
         self._columns, self._column_units = further_columns(columns, column_units, self._u)
         self._hold, self._drive_unit, self._source = hold, drive_unit, source
-        self._notes = tuple(map(str, notes))
+        self._notes = (*map(str, notes), *filled.notes)
         self._start = 0
         self._sha256: str | None = None
+        self._far: Mask | None = None
 
     @classmethod
     def from_frame(
@@ -146,6 +166,7 @@ class Dataset(Viewed):
         units: Mapping[str | int, str] | None = None,
         dt: float | None = None,
         hold: Hold = "foh",
+        missing: Missing = None,
     ) -> Dataset:
         """Make a record of a data frame, of pandas or polars.
 
@@ -154,7 +175,7 @@ class Dataset(Viewed):
         frame : DataFrame
             With one row for each sample. Titles have units, as in a text log: ``voltage_V``,
             ``x (um)``.
-        time, drive, displacement, units, dt, hold
+        time, drive, displacement, units, dt, hold, missing
             As in `piezotrack.read`.
 
         Returns
@@ -193,6 +214,7 @@ class Dataset(Viewed):
             hold=hold,
             drive_unit=drive_unit,
             source="data frame",
+            missing=missing,
         )
 
     def to_frame(self) -> Any:
@@ -215,7 +237,7 @@ class Dataset(Viewed):
         ['time_s', 'drive_V', 'displacement_um']
         """
         drive = {f"drive_{self.drive_unit}": self.u}
-        return frame_of({"time_s": self.t, **drive, "displacement_um": 1e6 * self.y})
+        return frame_of({"time_s": self.t, **drive, "displacement_um": 1e6 * self.recorded})
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the window as a log that `piezotrack.read` reads: the same numbers, in SI.
@@ -273,6 +295,80 @@ class Dataset(Viewed):
     def y(self) -> Array:
         """Displacement in the window [m], shape (n,)."""
         return self._y[self._start :]
+
+    @property
+    def recorded(self) -> Array:
+        """Displacement as it was read [m], NaN where it is missing; shape (n,).
+
+        It differs from `y` where `left_out` says so.
+        """
+        return (self._y if self._recorded is None else self._recorded)[self._start :]
+
+    @property
+    def left_out(self) -> Mask | None:
+        """Samples in the window whose displacement does not count; None where all count.
+
+        There `y` is on the straight line between the readings beside.
+        """
+        return None if self._left_out is None else self._left_out[self._start :]
+
+    @property
+    def far(self) -> Mask:
+        """Samples in the window that are single readings far off, shape (n,)."""
+        if self._far is None:
+            self._far = far_readings(self._u, self._y)
+        return self._far[self._start :]
+
+    @property
+    def far_notes(self) -> list[str]:
+        """A sentence on the single readings far off that are in the window; none without any."""
+        return far_notes(self.t, self.recorded, self.far)
+
+    def counted(self, values: Array) -> Array:
+        """Return the entries of values in the window at the samples that count.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n,)
+            One for each sample.
+
+        Returns
+        -------
+        ndarray
+            `values` where all of them count.
+        """
+        return values if self._left_out is None else values[~self._left_out[self._start :]]
+
+    def without_far_readings(self) -> Dataset:
+        """Return the record without single readings far off, as `identify` and scores take it.
+
+        Returns
+        -------
+        Dataset
+            The record itself where there are none, or where they are more than one in a hundred.
+            Its `left_out` has them; `recorded` and `sha256` are those of before.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = np.sin(np.arange(4000) / 300.0)
+        >>> y = 20e-6 * u
+        >>> y[471] += 30e-6
+        >>> log = pt.Dataset(u=u, y=y, dt=0.001)
+        >>> f"{log.stroke * 1e6:.0f} um, {log.without_far_readings().stroke * 1e6:.0f} um"
+        '70 um, 40 um'
+        """
+        left_out, far = self.left_out, self.far
+        if not far.any() or not are_few(far) or (left_out is not None and left_out[far].all()):
+            return self
+        part = self._part(0, self._u.size, start=self._start)
+        # Those of the warm-up, which does not count, have no effect.
+        apart = far_readings(self._u, self._y) if self._far is None else self._far
+        mask = apart if self._left_out is None else self._left_out | apart
+        part._recorded = self._y if self._recorded is None else self._recorded
+        part._y, part._left_out = signal_of("y", bridged(self._y, mask)), mask
+        return part
 
     @property
     def dt(self) -> float:
@@ -333,13 +429,14 @@ class Dataset(Viewed):
     def sha256(self) -> str:
         """Fingerprint of the numbers, 64 hexadecimal digits.
 
-        SHA-256 over little-endian float64: `dt`, all of `full.u`, all of `full.y`, `warmup`.
+        SHA-256 over little-endian float64: `dt`, all of `full.u`, all of `full.recorded`, `warmup`.
         """
         if self._sha256 is None:
             import hashlib
 
             digest = hashlib.sha256()
-            for part in (self._dt, self._u, self._y, self._start):
+            recorded = self._y if self._recorded is None else self._recorded
+            for part in (self._dt, self._u, recorded, self._start):
                 digest.update(np.asarray(part, dtype="<f8").tobytes())
             self._sha256 = digest.hexdigest()
         return self._sha256
@@ -410,7 +507,12 @@ class Dataset(Viewed):
         from .rates import at_lower_rate
 
         factor = decimation_factor(factor, len(self))
-        less = self._resampled(*at_lower_rate(self._t, factor, self._start % factor))
+        first = self._start % factor
+        whole = self.without_far_readings()
+        less = whole._resampled(*at_lower_rate(self._t, factor, first))
+        if whole is not self:
+            less._notes += tuple(self.far_notes)
+        less._left_out = thinned(self._left_out, factor, first)
         return less._part(0, len(less), start=self._start // factor)
 
     def interpolate(self, factor: int) -> Dataset:
@@ -453,7 +555,12 @@ class Dataset(Viewed):
         from .rates import at_higher_rate
 
         factor = interpolation_factor(factor, self._t.size, self._hold)
-        fine = self._resampled(*at_higher_rate(self._t, self._dt, factor))
+        whole = self.without_far_readings()
+        fine = whole._resampled(*at_higher_rate(self._t, self._dt, factor))
+        if whole is not self:
+            fine._notes += tuple(self.far_notes)
+        if self._left_out is not None:
+            fine._left_out = np.repeat(self._left_out, factor)[: fine._u.size]
         return fine._part(0, len(fine), start=self._start * factor)
 
     def _resampled(self, times: Array, change: Callable[[Array], Array]) -> Dataset:
@@ -481,6 +588,9 @@ class Dataset(Viewed):
         part.__dict__.update(self.__dict__)
         part._t, part._u, part._y = (a[first:stop] for a in (self._t, self._u, self._y))
         part._columns = {name: a[first:stop] for name, a in self._columns.items()}
+        for name in ("_recorded", "_left_out", "_far"):
+            kept = getattr(self, name)
+            setattr(part, name, None if kept is None else kept[first:stop])
         part._start, part._sha256 = start, None
         return part
 

@@ -41,6 +41,9 @@ class Signals(Protocol):
     def y(self) -> Array: ...
 
     @property
+    def recorded(self) -> Array: ...
+
+    @property
     def drive_unit(self) -> str: ...
 
     @property
@@ -66,7 +69,7 @@ def write_log(log: Signals, path: Path) -> Path:
         The file.
     """
     return write_columns(
-        path, {"time_s": log.t, "voltage_V": log.u, "displacement_um": 1e6 * log.y}
+        path, {"time_s": log.t, "voltage_V": log.u, "displacement_um": 1e6 * log.recorded}
     )
 
 
@@ -80,7 +83,7 @@ def save_log(log: Signals, path: str | os.PathLike[str]) -> Path:
     columns = [
         WrittenColumn("time", "s", log.t, "time_s"),
         _drive(log),
-        WrittenColumn("displacement", "m", log.y, "displacement_m"),
+        WrittenColumn("displacement", "m", log.recorded, "displacement_m"),
     ]
     columns += [
         _further(name, log.column_units[name], values) for name, values in log.columns.items()

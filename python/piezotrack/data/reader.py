@@ -18,6 +18,7 @@ from ..errors import ParameterError
 from .dataset import Dataset
 from .dataset_arguments import MIN_SAMPLES
 from .formats import open_log
+from .missing import checked_missing
 from .resampling import even_times, evened
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
     from .columns import Column
     from .dataset import Hold
+    from .missing import Missing
 
     Array = NDArray[np.float64]
 
@@ -47,6 +49,7 @@ def read(
     dt: float | None = None,
     resample: float | None = None,
     hold: Hold = "foh",
+    missing: Missing = None,
 ) -> Dataset:
     r"""Read the log of one axis from a file.
 
@@ -79,6 +82,10 @@ def read(
         half the new rate would be misread; `Dataset.decimate` then lowers the rate without that.
     hold : {"foh", "zoh"}, optional
         Drive between two samples; see `Dataset`.
+    missing : {"drop", "fill"}, optional
+        What becomes of readings of drive and displacement that are NaN, or empty in a text:
+        ``"drop"`` leaves them out of what is fitted and judged, ``"fill"`` puts straight lines
+        there; see `Dataset`. A log with missing readings is refused where it is not given.
 
     Returns
     -------
@@ -109,13 +116,14 @@ def read(
     """
     log = Log(path)
     roles = log.roles({"time": time, "drive": drive, "displacement": displacement}, units, dt)
+    log.takes(checked_missing(missing), roles)
     if resample is not None:
         if dt is not None:
             raise ParameterError(
                 "dt and resample: expected one of them at most, both are given", argument="dt"
             )
         check_dt(resample, "resample")
-    return log.dataset(roles, dt, hold, resample)
+    return log.dataset(roles, dt, hold, resample, missing)
 
 
 class DriveRecord(NamedTuple):
@@ -273,6 +281,7 @@ class Log:
         dt: float | None,
         hold: Hold,
         resample: float | None = None,
+        missing: Missing = None,
     ) -> Dataset:
         """Read the samples."""
         main = {role: c for role, c in roles.items() if role != "time" or dt is None}
@@ -306,7 +315,14 @@ class Log:
                 column_units=units,
                 source=self.source.name,
                 notes=self.columns.notes,
+                missing=missing,
             )
+
+    def takes(self, missing: Missing, roles: Mapping[str, Column]) -> None:
+        """Say what becomes of missing readings, which are refused where it is None."""
+        signals = {column.index for role, column in roles.items() if role != "time"}
+        self.table.signals = frozenset(signals)
+        self.table.takes_missing = missing is not None
 
     def _times(self, column: Column, table: Mapping[int, Array], resample: float | None) -> Array:
         """Convert the times [s], and refuse those that are not increasing or not even."""
@@ -334,7 +350,7 @@ class Log:
         """
         with np.errstate(over="ignore"):
             converted = require(column.unit).to_si(values)
-        beyond = ~(np.abs(converted) < LARGEST)
+        beyond = np.abs(converted) >= LARGEST
         if beyond.any():
             sample = int(np.argmax(beyond))
             raise self.source.error(

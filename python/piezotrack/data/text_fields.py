@@ -14,7 +14,17 @@ if TYPE_CHECKING:
 
     from .columns import Column
 
-__all__ = ["are_titles", "delimiter_of", "field_fault", "number_of", "split_fields"]
+__all__ = [
+    "are_titles",
+    "delimiter_of",
+    "field_fault",
+    "is_missing",
+    "number_of",
+    "split_fields",
+]
+
+# What programs write where there is no reading; a minus alone too.
+MISSING = ("", "nan", "na", "n/a", "null", "none")
 
 
 def are_titles(fields: Sequence[str]) -> bool:
@@ -52,6 +62,11 @@ def number_of(text: str) -> float:
         return math.nan if "_" in text else float(text)
     except ValueError:
         return math.nan
+
+
+def is_missing(text: str) -> bool:
+    """Whether a field says that there is no reading."""
+    return text.lower().lstrip("+-") in MISSING
 
 
 def field_fault(text: str, column: Column, swap: bool) -> str:

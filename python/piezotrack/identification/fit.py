@@ -82,9 +82,11 @@ def identify(
     ----------
     data : Dataset, Record or sequence of these
         The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
-        warm-up. Or several records, in a list, whose drives have one unit. A `Record` has an
-        offset, a delay, a drift, a history and a weight of its own, in place of the arguments
-        below. `Identification.records` has what was found of each alone.
+        warm-up. Single readings far off are left out (`Dataset.without_far_readings`), and so are
+        missing ones (``pt.read(..., missing="drop")``). Or several records, in a list, whose drives
+        have one unit. A `Record` has an offset, a delay, a drift, a history and a weight of its
+        own, in place of the arguments below. `Identification.records` has what was found of each
+        alone.
     model : str, optional
         Name of the model. By default, ``"auto"``, those that suit the record are fitted to the
         first three fifths of the window and judged on the rest, and the best is fitted to all of
@@ -134,12 +136,13 @@ def identify(
         whose drive turns fewer than six times shows none: a loop that is not closed would look the
         same. Where it is not given: for models found by least squares what the record shows, for
         models that are searched none. Several records have drifts of their own.
-    history : {"virgin", "settled", "fit"}, optional
+    history : {"virgin", "settled", "fit", "rest"}, optional
         What the stage went through before the record, whose first sample finds it in equilibrium:
         nothing (``"virgin"``), the drive of the record once or more until the hysteresis repeats
         (``"settled"``), or a voltage that is fitted with the rest, V (``"fit"``), with the creep
-        that it left. Where it is not given, what the record shows: with more freedom only where
-        that lowers the cost by 2 %.
+        that it left. Or it was at rest at 0 V until the drive jumped to its first sample within one
+        interval (``"rest"``, of one record), which is then not judged. Where it is not given, what
+        the record shows: with more freedom only where that lowers the cost by 2 %.
     method : {"descents", "swarm"}, Descents, ParticleSwarm, LeastSquares or sequence, optional
         What searches: descents from random points until independent ones agree (the default), or
         a particle swarm; with settings, a seed and a number of independent runs. Of models that

@@ -51,8 +51,8 @@ def _measured(result: Output, seed: int) -> None:
     from .demonstration import run_demo
     from .loop_plot import plot_before_and_after
 
-    # The logs are known, and so is the kind of model that suits them.
-    model = identification_files("prandtl-ishlinskii", searched=False)
+    # The logs are known, and so is the model that suits them.
+    model = identification_files("asymmetric-prandtl-ishlinskii", searched=False)
     result.will_write(["log.csv", "other.csv", *model, *picture_files(*PICTURES)])
     found = run_demo(seed, progress=result.progress)
     fit, other = found.fit, found.other
@@ -84,7 +84,7 @@ def _measured(result: Output, seed: int) -> None:
         *_runs({name: name for name in found.runs}, found.runs),
         "",
         "The same by hand, and more:",
-        *(f"  piezotrack {line}" for line in _commands(result.out)),
+        *(f"  piezotrack {line}" for line in _commands(result.out, fit.model.info.name)),
     ]
     document = {
         "model": {**fit.document(), "notes": fit.notes},
@@ -95,11 +95,11 @@ def _measured(result: Output, seed: int) -> None:
     result.show("\n".join(words), document, written)
 
 
-def _commands(out: Path) -> list[str]:
+def _commands(out: Path, name: str) -> list[str]:
     """Return what to type next."""
     from .demonstration import FEEDBACK, NOISE, REFERENCE, WINDOW
 
-    log, other, model = (out / name for name in ("log.csv", "other.csv", "prandtl-ishlinskii.json"))
+    log, other, model = (out / name for name in ("log.csv", "other.csv", f"{name}.json"))
     window = "{:g}:{:g}".format(*WINDOW)
     return [
         f"identify {log} --window {window} --validate {other} --validate-window 3:",

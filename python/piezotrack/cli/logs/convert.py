@@ -10,6 +10,7 @@ from ..options import (
     DriveColumn,
     Interval,
     LogFile,
+    MissingOption,
     OutFile,
     Overwrite,
     Quiet,
@@ -33,6 +34,7 @@ def convert_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    missing: MissingOption = None,
     quiet: Quiet = False,
 ) -> None:
     """Write a log of any format as CSV, NPZ, MAT or Parquet.
@@ -46,7 +48,7 @@ def convert_command(
     format_to_write(out)
     if out.exists() and not overwrite:
         raise ParameterError(f"{out} exists: expected --overwrite, or another name")
-    log = Columns(time, drive, displacement, unit, dt).read(file, "foh", resample)
+    log = Columns(time, drive, displacement, unit, dt).read(file, "foh", resample, missing)
     written = log.save(out)
     if not quiet:
         print(f"{len(log)} samples, {log.duration:.6g} s at {1.0 / log.dt:.6g} Hz")

@@ -12,6 +12,7 @@ from ..options import (
     Interval,
     Json,
     LogFile,
+    MissingOption,
     TimeColumn,
     Units,
 )
@@ -27,6 +28,7 @@ def info_command(
     displacement: DisplacementColumn = None,
     unit: Units = None,
     dt: Interval = None,
+    missing: MissingOption = None,
     json: Json = False,
 ) -> None:
     """Show what is in a log and what it can tell.
@@ -35,7 +37,7 @@ def info_command(
     record can determine.
     """
     from ..._support.files.writing import json_ready
-    from ...data.log_info import info
+    from ...data.checks.log_info import info
     from ..advice import as_options
 
     columns = Columns(time, drive, displacement, unit, dt)
@@ -46,6 +48,7 @@ def info_command(
         displacement=columns.displacement,
         units=columns.units,
         dt=columns.dt,
+        missing=missing,
     )
     if json:
         print(json_text.dumps(json_ready(found.document()), indent=2, allow_nan=False))

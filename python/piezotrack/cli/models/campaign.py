@@ -19,6 +19,7 @@ from ..options import (
     HoldOption,
     Interval,
     Json,
+    MissingOption,
     Quiet,
     Resample,
     Seconds,
@@ -99,6 +100,7 @@ def campaign_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    missing: MissingOption = None,
     hold: HoldOption = "foh",
     free: Free = None,
     fix: Fix = None,
@@ -171,7 +173,7 @@ def campaign_command(
     numbers = _seeds(seeds)
     columns = Columns(time, drive, displacement, unit, dt)
     logs = {
-        title: windowed(columns.read(file, hold, resample), file, "--window", window)
+        title: windowed(columns.read(file, hold, resample, missing), file, "--window", window)
         for title, file in _titles(files).items()
     }
     with _executor(workers, dask) as executor:

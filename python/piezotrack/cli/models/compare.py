@@ -17,6 +17,7 @@ from ..options import (
     Interval,
     Json,
     LogFile,
+    MissingOption,
     Out,
     Overwrite,
     Quiet,
@@ -65,6 +66,7 @@ def compare_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    missing: MissingOption = None,
     hold: HoldOption = "foh",
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
     runs: Annotated[int, typer.Option(help="Number of independent searches.")] = 1,
@@ -86,12 +88,12 @@ def compare_command(
 
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     columns = Columns(time, drive, displacement, unit, dt)
-    log = columns.read(file, hold, resample)
+    log = columns.read(file, hold, resample, missing)
     fitted = None if train is None else seconds("--train", train)
     judged = None if test is None else seconds("--test", test)
     second = None
     if test_log is not None:
-        second = windowed(columns.read(test_log, hold, resample), test_log, "--test", test)
+        second = windowed(columns.read(test_log, hold, resample, missing), test_log, "--test", test)
     # A model file that is given is written as it is.
     given = {Path(name).resolve() for name in model or []}
     with of_file(file):

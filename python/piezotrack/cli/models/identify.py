@@ -19,6 +19,7 @@ from ..options import (
     HoldOption,
     Interval,
     Json,
+    MissingOption,
     Out,
     Overwrite,
     Quiet,
@@ -89,6 +90,7 @@ def identify_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    missing: MissingOption = None,
     hold: HoldOption = "foh",
     free: Free = None,
     fix: Fix = None,
@@ -164,12 +166,12 @@ def identify_command(
         raise ParameterError("--validate-window is given without --validate")
     windows = each_of("--window", window, len(files))
     logs = [
-        windowed(columns.read(file, hold, resample), file, "--window", one)
+        windowed(columns.read(file, hold, resample, missing), file, "--window", one)
         for file, one in zip(files, windows, strict=True)
     ]
     second = None
     if validate is not None:
-        whole = columns.read(validate, hold, resample)
+        whole = columns.read(validate, hold, resample, missing)
         second = windowed(whole, validate, "--validate-window", validate_window)
     records = of_each_log(
         logs, offset=offset, delay=delay, drift=drift, history=history, weight=weight

@@ -16,6 +16,7 @@ from ..options import (
     HoldOption,
     Interval,
     Json,
+    MissingOption,
     Out,
     Overwrite,
     Quiet,
@@ -46,6 +47,7 @@ def step_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    missing: MissingOption = None,
     hold: HoldOption = "zoh",
     stiffness: Annotated[
         float | None, typer.Option(help="Stiffness in N/m; default unknown.")
@@ -68,7 +70,7 @@ def step_command(
     from ..._support.files.writing import picture_files
     from ...identification.experiments.step_response import identify_step
 
-    log = Columns(time, drive, displacement, unit, dt).read(file, hold, resample)
+    log = Columns(time, drive, displacement, unit, dt).read(file, hold, resample, missing)
     log = windowed(log, file, "--window", window)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["step.json", *picture_files("step")])

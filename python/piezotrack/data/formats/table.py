@@ -13,6 +13,7 @@ from ..._support.arrays import MOST_SAMPLES, unmasked
 from ..._support.units import lookup, split_unit, symbol_of
 from ...errors import DataError
 from ..columns import Column, Columns
+from ..missing import USE_MISSING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -109,12 +110,18 @@ class Table(ABC):
         The line of a text that names the columns.
     dt : float or None
         Sampling interval that the file states for all columns [s].
+    signals : frozenset of int
+        Columns whose missing readings can be left out or filled; a fault of theirs says so.
+    takes_missing : bool
+        Whether they are, as NaN.
     """
 
     source: Source
     columns: Columns
     header: int | None = None
     dt: float | None = None
+    signals: frozenset[int] = frozenset()
+    takes_missing: bool = False
 
     @abstractmethod
     def values(self, main: Sequence[Column]) -> Mapping[int, Array]:
@@ -123,7 +130,8 @@ class Table(ABC):
         Parameters
         ----------
         main : sequence of Column
-            The columns that are needed; their samples are finite.
+            The columns that are needed; their samples are finite, or NaN where missing ones are
+            taken.
 
         Returns
         -------
@@ -267,9 +275,12 @@ class ChannelTable(Table):
         table = {}
         for column in main:
             values = self.column(column)
-            if (bad := _first(~np.isfinite(values))) is not None:
+            missing = np.isnan(values) & (column.index in self.signals)
+            fits = np.isfinite(values) | (missing & self.takes_missing)
+            if (bad := _first(~fits)) is not None:
+                remedy = USE_MISSING if missing[bad] else ""
                 raise self.source.error(
-                    f"{column} is {values[bad]} at sample {bad}: expected finite numbers"
+                    f"{column} is {values[bad]} at sample {bad}: expected finite numbers{remedy}"
                 )
             table[column.index] = values
         groups = {column.group for column in main}

@@ -281,6 +281,7 @@ def compare(
     expect("data", data, Dataset, "a Dataset, see pt.read")
     wanted = _wanted(models, data.drive_unit)
     first, second, carried = parts_of(data, train, test)
+    first, second = first.without_far_readings(), second.without_far_readings()
     method = (Descents(seed=seed, runs=runs), LeastSquares())
     rows = []
     for name, title, source in wanted:
@@ -391,7 +392,7 @@ def _compared(
     """Score a model on both parts."""
     here = fit.fitted_on(train)
     score = fit.score(train, offset=fit.offset if here else "own")
-    error = train.y - fit.simulate(train, offset=score.offset).x
+    error = train.counted(train.y - fit.simulate(train, offset=score.offset).x)
     count = fit.free_count if here else None
     _, _, autocorrelation, aic, bic = _core.residual(error, count or 0)
     tested = fit.score(test, offset=score.offset if carried else "own")

@@ -403,7 +403,7 @@ def identify_step(
     ----------
     data : Dataset or StepReadings
         The record, its window with one step and some samples before it; or readings entered by
-        hand.
+        hand. Missing readings are on straight lines, ``missing="drop"`` or not.
     stiffness : float, optional
         K [N/m].
     mass : float, optional

@@ -121,7 +121,14 @@ class Drift:
         left -= left.mean()
         return left
 
-    def of_another(self, t: Array, rest: Array, *, centred: bool) -> Array:
+    def of_another(
+        self,
+        t: Array,
+        rest: Array,
+        *,
+        centred: bool,
+        left_out: NDArray[np.bool_] | None = None,
+    ) -> Array:
         """Drift of another record of the same sensor, by least squares with this time constant.
 
         Parameters
@@ -132,6 +139,8 @@ class Drift:
             What the stage leaves of its readings [m].
         centred : bool
             Whether an offset is taken off besides.
+        left_out : ndarray of bool, shape (n,), optional
+            Readings that do not count.
 
         Returns
         -------
@@ -139,7 +148,8 @@ class Drift:
             Part of its readings [m].
         """
         fading = self._shape(t, float(t[0]), float(t[-1]))
-        shape = fading - fading.mean() if centred else fading
+        counted, rest = (fading, rest) if left_out is None else (fading[~left_out], rest[~left_out])
+        shape = counted - counted.mean() if centred else counted
         size = float(shape @ shape)
         found: Array = fading * (float(shape @ rest) / size if size > 0.0 else 0.0)
         return found

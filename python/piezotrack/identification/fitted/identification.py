@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ..._support.statistics import sample_noise
-from ...data import diagnostics
+from ...data.checks import diagnostics
+from ...data.checks.connections import unusual_connection
+from ...data.checks.hum import hum_lines, hum_notes, power_of
 from ..methods.descents import Descents
 from ..methods.particle_swarm import ParticleSwarm
 from .fitted_record import FittedRecord
@@ -182,21 +184,29 @@ class Identification(IdentifiedModel):
     def _notes_on(self, data: Dataset, record: FittedRecord, run: Response) -> list[str]:
         """Warnings about one of the records and the fit there."""
         notes, rest = diagnostics.record_warnings(data), data.y - run.x
+        if data.left_out is not None:
+            rest[data.left_out] = data.counted(rest).mean()
         if record.cost_percent > 5.0:
             notes.append(
                 "the model does not fit this record: the residual is "
                 f"{record.cost_percent:.3g} % of stroke"
             )
-        if record.cost_percent > diagnostics.REMAINS:
+        connection = unusual_connection(data.u, data.y)
+        if record.cost_percent > diagnostics.REMAINS and (connection is None or connection.follows):
             held = [name for name, estimate in self.parameters.items() if not estimate.free]
             notes += diagnostics.fit_warnings(
                 data, run.x, record.cost_percent, self.model.info.hysteresis, held
             )
         notes += drift_notes(record.drift, record.stroke)
         notes += self.model._notes(lambda: run)
+        lines = hum_lines(rest, data.u, data.y, data.dt)
+        notes += hum_notes(lines)
         if self.selection:
             # A mode moves from sample to sample as noise does; what is left of it hardly does.
-            notes += above_noise(record.cost, min(sample_noise(data.y), sample_noise(rest)))
+            without_hum = (
+                math.sqrt(max(record.cost**2 - power_of(lines), 0.0)) if lines else record.cost
+            )
+            notes += above_noise(without_hum, min(sample_noise(data.y), sample_noise(rest)))
         return notes + first_samples(rest, data)
 
     @property

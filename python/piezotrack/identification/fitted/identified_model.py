@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -47,6 +48,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = ["IdentifiedModel"]
+
+# A residual of so many times that of the fit is not explained by a simple history.
+EXPLAINED = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -299,7 +303,7 @@ class IdentifiedModel(Result):
             Added to the displacement [m]. ``"own"``: if an offset was fitted, the one that fits
             this record's window best, otherwise none; and if a drift was fitted, on another record
             one of its own with the same time constant.
-        history : {"virgin", "settled", "fit"}, optional
+        history : {"virgin", "settled", "fit", "rest"}, optional
             What the stage went through before the record; see `identify`. Where it is not given:
             of a record identified as it was there, of another one what that record shows.
         initial : StageState, optional
@@ -312,13 +316,14 @@ class IdentifiedModel(Result):
             Motion in the window; offset and delay are in its displacement, the rest is the
             stage's own. The delay is that of the record where it is one of those identified.
         """
+        expect("data", data, Dataset, "a Dataset")
+        data = data.without_far_readings()
         run = self._run(data, history, initial)
         drift, shift = self._added(data, run.x, offset)
         return replace(run, x=run.x + drift + shift)
 
     def _run(self, data: Dataset, history: History | None, initial: StageState | None) -> Response:
         """Response in the window of a record, as it is read but for an offset."""
-        expect("data", data, Dataset, "a Dataset")
         if data.drive_unit != (unit := self.drive_unit) and "m" in (unit, data.drive_unit):
             raise ParameterError(
                 "data",
@@ -348,7 +353,9 @@ class IdentifiedModel(Result):
         drift: Array | float = 0.0
         known = [self.start, *(one.start for one in self.records)]
         if self.drift and offset == "own" and not any(same_beginning(one, data) for one in known):
-            drift = self.drift.of_another(data.t, data.y - x, centred=self._fits_offset(data))
+            drift = self.drift.of_another(
+                data.t, data.y - x, centred=self._fits_offset(data), left_out=data.left_out
+            )
         return drift, self._shift(data, x + drift, offset)
 
     def score(
@@ -367,7 +374,7 @@ class IdentifiedModel(Result):
             The record, e.g. one that was not fitted.
         offset : float or "own", optional
             As in `simulate`.
-        history : {"virgin", "settled", "fit"}, optional
+        history : {"virgin", "settled", "fit", "rest"}, optional
             As in `simulate`.
         initial : StageState, optional
             As in `simulate`.
@@ -378,17 +385,19 @@ class IdentifiedModel(Result):
             Percentages refer to the stroke of the record identified: of one of several to its
             own, of another record to the largest.
         """
+        expect("data", data, Dataset, "a Dataset")
+        data = data.without_far_readings()
         x = self._run(data, history, initial).x
         drift, shift = self._added(data, x, offset)
-        error = data.y - x - drift - shift
+        error = data.counted(data.y - x - drift - shift)
         own = self._own(data)
         return Score(
             rms=float(np.sqrt(np.mean(error**2))),
             max_error=float(np.abs(error).max()),
             stroke=self.stroke if own is None else own.stroke,
             offset=shift,
-            spread=float(np.std(data.y)),
-            notes=tuple(self.extrapolation_notes(data.u, data.dt)),
+            spread=float(np.std(data.counted(data.y))),
+            notes=(*self.extrapolation_notes(data.u, data.dt), *data.far_notes),
         )
 
     def start_on(self, data: Dataset, *, history: History | None = None) -> Start:
@@ -398,7 +407,7 @@ class IdentifiedModel(Result):
         ----------
         data : Dataset
             The record.
-        history : {"virgin", "settled", "fit"}, optional
+        history : {"virgin", "settled", "fit", "rest"}, optional
             As in `simulate`.
 
         Returns
@@ -407,12 +416,22 @@ class IdentifiedModel(Result):
             Its `state` is in equilibrium under the first sample of the drive.
         """
         expect("data", data, Dataset, "a Dataset")
+        data = data.without_far_readings()
         history = checked_history(history)
         own = self._own(data)
         known = self.start if own is None else own.start
         if known and same_beginning(known, data) and history in (None, known.history):
             return known
-        return begin(self.model, data, history, self._residual, offset=self._fits_offset(data))
+        cost = self.details.get("fit", {}).get("cost", {}).get("value", math.inf)
+        return begin(
+            self.model,
+            data,
+            history,
+            self._residual,
+            offset=self._fits_offset(data),
+            enough=EXPLAINED * cost,
+            reached=self.drive_range,
+        )
 
     def _residual(self, data: Dataset, state: StageState) -> Array:
         """Measured less simulated displacement in the window, without offset [m]."""
@@ -446,7 +465,7 @@ class IdentifiedModel(Result):
             if not abs(shift) < LARGEST:
                 raise ParameterError("offset", shift, f"'own', or m below {LARGEST:g}")
             return shift
-        return float(np.mean(data.y - x)) if self._fits_offset(data) else 0.0
+        return float(np.mean(data.counted(data.y - x))) if self._fits_offset(data) else 0.0
 
     def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Loop, displacement with its error over time, and convergence of a search.

@@ -82,9 +82,10 @@ def deviation_of(records: Sequence[tuple[Dataset, float]]) -> float:
         Of one record that of its displacement.
     """
     if len(records) == 1:
-        return float(records[0][0].y.std())
-    counts = np.array([weight * len(data) for data, weight in records])
-    squares = np.array([float(data.y.var()) for data, _ in records])
+        data = records[0][0]
+        return float(data.counted(data.y).std())
+    counts = np.array([weight * len(data.counted(data.y)) for data, weight in records])
+    squares = np.array([float(data.counted(data.y).var()) for data, _ in records])
     return math.sqrt(float(counts @ squares) / float(counts.sum()))
 
 
@@ -229,6 +230,10 @@ def start_notes(start: Start | None, data: Dataset) -> str | None:
     unit, first = data.drive_unit, float(data.full.u[0])
     other = start.voltage
     came_from = "another drive" if other is None else drive_text(other, unit)
+    if start.history == "rest":
+        rest = drive_text(other or 0.0, unit)
+        to = drive_text(first, unit)
+        return f"at rest at {rest} until the drive jumped to its first sample, {to}"
     before = {
         "virgin": "never moved before",
         "settled": "settled under the record's own drive",
@@ -268,6 +273,13 @@ def lag_notes(lags: LagRange | None, frequency: float) -> list[str]:
     ]
 
 
+def carried_by_first_samples(rest: Array) -> bool:
+    """Return whether the first tenth of a residual carries more than half of its squares."""
+    squares = (rest - rest.mean()) ** 2
+    count = math.floor(FIRST * rest.size)
+    return count > 0 and bool(squares[:count].sum() >= CARRIED * squares.sum())
+
+
 def first_samples(rest: Array, data: Dataset) -> list[str]:
     """Say that the first samples carry the cost.
 
@@ -285,7 +297,7 @@ def first_samples(rest: Array, data: Dataset) -> list[str]:
     """
     squares = np.cumsum((rest - rest.mean()) ** 2)
     count = math.floor(FIRST * rest.size)
-    if count < 1 or squares[count - 1] < CARRIED * squares[-1]:
+    if not carried_by_first_samples(rest):
         return []
     # As far as the residual is well above that of the rest.
     later = (squares[-1] - squares[count - 1]) / (rest.size - count)

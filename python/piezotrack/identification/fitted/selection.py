@@ -16,13 +16,16 @@ class Trial(NamedTuple):
     model, title : str
         Name of the model, and its title.
     rms : float
-        Root mean square of the residual on the part that was not fitted [m]; where the record is
-        too short to be parted, on all of it.
+        Root mean square of the residual on the part that was not fitted [m], amplitudes and rates
+        of the drive that differ by a factor of two counting alike.
+    seconds : float
+        Time that it took [s]; 0 where it was read from a file.
     """
 
     model: str
     title: str
     rms: float
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,9 +36,8 @@ class Selection:
     ----------
     trials : tuple of Trial
         The models that were tried, the best first.
-    fitted_until : float or None
+    fitted_until : float
         End of the part of the window that these were fitted to [s]; they were judged on the rest.
-        None where the window is too short for two parts.
 
     Examples
     --------
@@ -46,4 +48,4 @@ class Selection:
     """
 
     trials: tuple[Trial, ...]
-    fitted_until: float | None
+    fitted_until: float

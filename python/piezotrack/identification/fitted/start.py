@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -32,13 +33,14 @@ __all__ = [
     "checked_history",
     "same_beginning",
     "start_after",
+    "start_at_jump",
     "start_entry",
     "start_of",
     "state_entry",
     "state_of",
 ]
 
-History = Literal["virgin", "settled", "fit"]
+History = Literal["virgin", "settled", "fit", "rest"]
 
 # A history with more freedom has to lower the rms of the residual by this share.
 GAIN = 0.02
@@ -57,13 +59,13 @@ class Start:
 
     Attributes
     ----------
-    history : {"virgin", "settled", "fit"}
-        What the stage went through before the record: nothing, the drive of the record, or a
-        voltage that was fitted.
+    history : {"virgin", "settled", "fit", "rest"}
+        What the stage went through before the record: nothing, the drive of the record, a voltage
+        that was fitted, or rest at 0 V until the drive jumped to its first sample.
     state : StageState
-        State at the first sample: in equilibrium.
+        State at the first sample: in equilibrium, but after such a jump.
     voltage : float or None
-        The voltage that was fitted [V].
+        The voltage that was fitted, or at which the stage was at rest [V].
     record : str
         Fingerprint of the beginning of the record.
     """
@@ -84,7 +86,7 @@ def checked_history(history: object) -> History | None:
 
     Returns
     -------
-    {"virgin", "settled", "fit"} or None
+    {"virgin", "settled", "fit", "rest"} or None
         The history; None where the record is to show it.
 
     Raises
@@ -202,7 +204,7 @@ def start_of(entry: Any, state: type[StageState]) -> Start | None:
 def fingerprint(data: Dataset) -> str:
     """Fingerprint of the beginning of a record, the same for all windows with warm-up."""
     digest = hashlib.sha256()
-    for part in (data.dt, data.full.u[:KNOWN_BY], data.full.y[:KNOWN_BY]):
+    for part in (data.dt, data.full.u[:KNOWN_BY], data.full.recorded[:KNOWN_BY]):
         digest.update(np.asarray(part, dtype="<f8").tobytes())
     return digest.hexdigest()
 
@@ -219,7 +221,7 @@ def start_of_fit(data: Dataset, history: History, state: StageState) -> Start:
     ----------
     data : Dataset
         The record.
-    history : {"virgin", "settled", "fit"}
+    history : {"virgin", "settled", "fit", "rest"}
         What the stage went through before.
     state : StageState
         State at the first sample.
@@ -248,7 +250,7 @@ def start_after(
         The stage.
     data : Dataset
         The record.
-    history : {"virgin", "settled", "fit"}
+    history : {"virgin", "settled", "fit", "rest"}
         What it went through before.
     voltage : float, optional
         The voltage that it came from, for ``"fit"`` [V].
@@ -267,6 +269,27 @@ def start_after(
     if creeps and history == "settled" and len(getattr(state, "creep", ())):
         state = _repeating(model, data, state)
     return Start(history=history, state=state, voltage=voltage, record=fingerprint(data))
+
+
+def start_at_jump(model: Stage, data: Dataset) -> Start:
+    """State at the first sample of a record to which the drive jumped from 0 V within an interval.
+
+    Parameters
+    ----------
+    model : Stage
+        The stage, at rest at 0 V before.
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    Start
+        The start, not in equilibrium.
+    """
+    drive = [0.0, float(data.full.u[0])]
+    rest = model.equilibrium(0.0)
+    state = model.simulate(drive, data.dt, hold=data.hold, initial=rest).final
+    return Start(history="rest", state=state, voltage=0.0, record=fingerprint(data))
 
 
 def _repeating(model: Any, data: Dataset, state: Any) -> StageState:
@@ -299,6 +322,8 @@ def begin(
     residual: Callable[[Dataset, StageState], Array],
     *,
     offset: bool,
+    enough: float = math.inf,
+    reached: tuple[float, float] | None = None,
 ) -> Start:
     """State of a stage at the first sample of a record, as the record shows it.
 
@@ -308,27 +333,34 @@ def begin(
         The stage.
     data : Dataset
         The record.
-    history : {"virgin", "settled", "fit"} or None
+    history : {"virgin", "settled", "fit", "rest"} or None
         What the stage went through before; None where the record is to show it.
     residual : callable
         Measured less simulated displacement in the window of a record [m], from a state at its
         first sample.
     offset : bool
         Whether a constant part of the residual is taken off.
+    enough : float, optional
+        Residual [m] up to which a virgin stage explains the record where a settled one does alike;
+        above it a voltage that the stage came from is fitted.
+    reached : (float, float), optional
+        Voltages that the stage has been at elsewhere [V], from which it may have come too.
 
     Returns
     -------
     Start
         The start; without more freedom than the record needs.
     """
-    search = _Search(model, _beginning(data), residual, offset)
+    if history == "rest":
+        return start_at_jump(model, data)
+    search = _Search(model, _beginning(data), residual, offset, reached or (math.inf, -math.inf))
     if history == "fit":
         return replace(search.fitted(), record=fingerprint(data))
     if history is not None:
         return start_after(model, data, history)
     virgin, settled = (start_after(model, search.data, one) for one in ("virgin", "settled"))
     best, rms = virgin, search.rms(virgin.state)
-    if not search.differ(virgin, settled, rms):
+    if not search.differ(virgin, settled, rms) and rms <= enough:
         return start_after(model, data, "virgin")
     if (other := search.rms(settled.state)) < (1.0 - GAIN) * rms:
         best, rms = settled, other
@@ -355,21 +387,23 @@ class _Search:
     data: Dataset
     residual: Callable[[Dataset, StageState], Array]
     offset: bool
+    reached: tuple[float, float]
 
     def rms(self, state: StageState) -> float:
-        rest = self.residual(self.data, state)
+        rest = self.data.counted(self.residual(self.data, state))
         return float(np.std(rest) if self.offset else np.sqrt(np.mean(rest**2)))
 
     def differ(self, start: Start, other: Start, rms: float) -> bool:
         """Whether two starts differ by what the record shows."""
         gap = self.residual(self.data, start.state) - self.residual(self.data, other.state)
-        return float(np.std(gap)) > SHOWS * rms
+        return float(np.std(self.data.counted(gap))) > SHOWS * rms
 
     def fitted(self) -> Start:
         """Start from the voltage that fits the record best."""
         low, high = float(self.data.full.u.min()), float(self.data.full.u.max())
         reach = 0.5 * (high - low)
-        grid = np.linspace(low - reach, high + reach, GRID)
+        ends = min(low - reach, self.reached[0]), max(high + reach, self.reached[1])
+        grid = np.linspace(*ends, GRID)
         costs = [self.from_voltage(volts)[1] for volts in grid]
         best = int(np.argmin(costs))
         left, right = grid[max(best - 1, 0)], grid[min(best + 1, GRID - 1)]
@@ -383,12 +417,13 @@ class _Search:
     def from_voltage(self, volts: float) -> tuple[Start, float]:
         """Start from a voltage, its creep where it fits best, and the rms of the residual."""
         start = start_after(self.model, self.data, "fit", float(volts))
-        rest = self.residual(self.data, start.state)
+        rest = self.data.counted(self.residual(self.data, start.state))
         weights = np.array(getattr(self.model, "creep_weights", ()))
         used = weights > 0.0
         columns = [np.ones(rest.size)] if self.offset else []
         if used.any():
-            t = self.data.dt * np.arange(len(self.data.full))[self.data.warmup :]
+            t = self.data.dt * np.arange(len(self.data.full), dtype=np.float64)
+            t = self.data.counted(t[self.data.warmup :])
             with np.errstate(over="ignore"):
                 columns += [np.exp(-t / time) for time in np.array(self.model.creep_times)[used]]
         if columns:

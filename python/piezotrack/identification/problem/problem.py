@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from ..._support.arguments import as_numbers, has_entries
 from ..._support.messages import quoted
-from ...data import diagnostics
+from ...data.checks import diagnostics
 from ...errors import ParameterError
 from ...stages.registry import model_named
 from .fingerprint import as_plain_data, record_hash

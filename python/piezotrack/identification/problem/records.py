@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,7 +44,7 @@ class Record:
     drift : bool or float, optional
         Slow drift of the sensor along the record: none (False), with a time constant that the
         record shows (True), or with this one [s]; see `identify` for where it is not given.
-    history : {"virgin", "settled", "fit"}, optional
+    history : {"virgin", "settled", "fit", "rest"}, optional
         What the stage went through before the record; what the record shows where not given.
     weight : float, optional
         How much each of its samples counts beside those of the other records: only the ratios
@@ -148,6 +148,7 @@ def records_of(
         entry if isinstance(entry, Record) else Record(entry, **values)  # type: ignore[arg-type]
         for entry in given
     )
+    records = tuple(_without_far_readings(one) for one in records)
     datasets = [one.data for one in records]
     for i, dataset in enumerate(datasets):
         if dataset.drive_unit != datasets[0].drive_unit:
@@ -158,6 +159,12 @@ def records_of(
                 argument="data",
             )
     return records
+
+
+def _without_far_readings(record: Record) -> Record:
+    """Leave single readings far off out of a record; the same record where there are none."""
+    data = record.data.without_far_readings()
+    return record if data is record.data else replace(record, data=data)
 
 
 def _listed(data: object) -> list[Dataset | Record]:

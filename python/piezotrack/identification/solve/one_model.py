@@ -10,6 +10,7 @@ from ...errors import Interrupted
 from ..fitted.start import GAIN
 from ..methods.least_squares import LeastSquares
 from .earlier_motion import earlier_motion
+from .jump import with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
 from .weights import solve_least_squares
@@ -20,11 +21,14 @@ if TYPE_CHECKING:
     from ..methods.choice import Method, Search
     from ..problem.problem import Problem
     from .run import Run
+    from .weights import Structure
 
 __all__ = ["identify_model"]
 
 
-def identify_model(problem: Problem, method: Method, run: Run) -> Identification:
+def identify_model(
+    problem: Problem, method: Method, run: Run, start: Structure | None = None
+) -> Identification:
     """Identify one model, by its method.
 
     Parameters
@@ -35,6 +39,8 @@ def identify_model(problem: Problem, method: Method, run: Run) -> Identification
         The one that the model needs.
     run : Run
         How it is run.
+    start : Structure, optional
+        Structure that least squares begin with.
 
     Returns
     -------
@@ -46,8 +52,21 @@ def identify_model(problem: Problem, method: Method, run: Run) -> Identification
     ParameterError, DataError, NumericalError, Interrupted
         As for `identify`.
     """
+
+    def identify(other: Problem) -> Identification:
+        return _identify(other, method, run, start)
+
+    if any(record.history == "rest" for record in problem.records):
+        return with_rest(problem, identify)
+    fit = identify(problem)
+    return with_rest_tried(problem, fit, identify) if len(problem.records) == 1 else fit
+
+
+def _identify(
+    problem: Problem, method: Method, run: Run, start: Structure | None
+) -> Identification:
     if isinstance(method, LeastSquares):
-        return _weights(problem, method, run)
+        return _weights(problem, method, run, start)
     if len(problem.records) > 1:
         return search_several_records(problem, method, run)
     if problem.records[0].history is not None:
@@ -55,11 +74,13 @@ def identify_model(problem: Problem, method: Method, run: Run) -> Identification
     return _with_history_shown(problem, method, run)
 
 
-def _weights(problem: Problem, method: LeastSquares, run: Run) -> Identification:
+def _weights(
+    problem: Problem, method: LeastSquares, run: Run, start: Structure | None
+) -> Identification:
     """Find the weights of a model by least squares."""
     try:
         with ProgressBar(run.progress, f"identify: {problem.model}, least squares"):
-            return solve_least_squares(problem, method, run.threads)
+            return solve_least_squares(problem, method, run.threads, start)
     except KeyboardInterrupt:
         raise Interrupted("interrupted before the weights were found") from None
 

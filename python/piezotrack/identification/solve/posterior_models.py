@@ -113,7 +113,7 @@ class _Beginning:
     """A record and the state in which it begins."""
 
     def __init__(self, model: IdentifiedModel, data: Dataset) -> None:
-        self.model, self.data = model, data
+        self.model, self.data = model, data.without_far_readings()
         known = model.start_on(data)
         # A fitted voltage before the record stays what it is.
         fitted = known.history == "fit"
@@ -124,9 +124,9 @@ class _Beginning:
     def residual(self, model: IdentifiedModel) -> Array:
         """Measured less simulated displacement, without offset and drift if fitted [m]."""
         run = model.simulate(self.data, offset=0.0, **self.how)
-        rest = self.data.y - run.x
+        rest = self.data.counted(self.data.y - run.x)
         if model.drift:
-            return model.drift.left_of(self.data.t, rest)
+            return model.drift.left_of(self.data.counted(self.data.t), rest)
         return np.asarray(rest - rest.mean() if model.offset_fitted else rest)
 
     def sensitivity(self, value: _Value) -> Array:

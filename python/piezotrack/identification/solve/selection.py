@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+import time
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +15,9 @@ from ..._support.statistics import sample_noise
 from ...errors import DataError, NumericalError
 from ...stages.registry import model_named
 from ..fitted.selection import Selection, Trial
+from ..methods.least_squares import LeastSquares
 from .one_model import identify_model
+from .weights import Structure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -29,82 +33,55 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["best_of_several", "identify_best", "is_white", "models_tried", "two_parts"]
+__all__ = ["identify_best", "is_white", "models_tried", "two_parts"]
 
-# Models that are tried for a drive in volts, and for a force.
-OF_VOLTS = ("prandtl-ishlinskii", "first-order-dahl", "parallel-dahl", "bouc-wen")
+# Models whose weights follow by least squares, the simpler first; and models that are searched.
+LEAST_SQUARES = (
+    "prandtl-ishlinskii",
+    "rate-dependent-prandtl-ishlinskii",
+    "polynomial-prandtl-ishlinskii",
+    "generalised-prandtl-ishlinskii",
+    "asymmetric-prandtl-ishlinskii",
+    "preisach",
+    "duhem",
+)
+SEARCHED = ("first-order-dahl", "parallel-dahl", "bouc-wen")
 OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
-# Share of the window that is fitted, and turns of the drive that each part needs.
-FITTED, TURNS = 0.6, 2
-# A residual of so many times the noise, on what was not fitted, is good enough to try no more.
-AS_NOISE = 1.5
+# Share of the window that is fitted, and turns of the drive that each part needs; and the share
+# where it turns too seldom.
+FITTED, TURNS, FITTED_OF_ONE_LOOP = 0.6, 2, 0.75
+# Fewer samples are not parted.
+LEAST_SAMPLES = 100
+# A residual of so many times the noise, on what was not fitted, is good enough to try no more; one
+# of so many times is good enough to search none.
+AS_NOISE, NEAR_NOISE = 1.5, 2.0
 # Correlation of residuals up to so many samples apart that is that of noise; and what chance makes
 # of it, in standard deviations.
 APART, CORRELATED, CHANCE = 10, 0.1, 4.0
-# Another model has to be better by this share than one before it in the list.
-BETTER = 0.03
+# Another model has to be better by this share than one before it in the list; where the record
+# has one loop, on which all are judged that were fitted to it, by more.
+BETTER, BETTER_ON_ONE_LOOP = 0.03, 0.1
+# Blocks of the drive that differ by this ratio in amplitude or rate are judged apart.
+APART_IN_SIZE = 2.0
+# A drive repeats where periods of it differ by less than this share.
+SAME_PERIOD = 0.01
 
 
 def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identification:
-    """Identify the model that describes a record best.
+    """Identify the model that describes records best.
 
-    Parameters
-    ----------
-    problem : Problem
-        One record, of any model.
-    methods : MethodChoice
-        The methods.
-    run : Run
-        How it is run.
-
-    Returns
-    -------
-    Identification
-        The best model, fitted to the whole window.
-
-    Raises
-    ------
-    ParameterError, DataError, NumericalError, Interrupted
-        As for `identify`.
-    """
-    (record,) = problem.records
-    part, rest = two_parts(record.data)
-    noise = sample_noise(rest.y)
-    first = replace(problem, records=(replace(record, data=part),))
-    of_trials = methods.of_trials() if rest is not part else methods
-    found: list[tuple[Trial, ModelInfo]] = []
-    refused: Exception | None = None
-    for info in models_tried(problem.records[0].data, problem.parameters):
-        try:
-            fit = identify_model(first.of_model(info), of_trials.method(info), run)
-            score = fit.score(rest, offset=fit.offset) if rest is not part else fit.fitted
-        except (DataError, NumericalError) as error:
-            refused = refused or error
-            continue
-        found.append((Trial(info.name, info.title, score.rms), info))
-        # Of a quick motion, differences from sample to sample are not the noise's alone.
-        if score.rms < AS_NOISE * noise and is_white(
-            rest.y - fit.simulate(rest, offset=fit.offset).x
-        ):
-            break
-    if not found:
-        raise refused or DataError("no model could be fitted")
-    best, info = best_of(found)
-    whole = fit if rest is part and best is found[-1][0] else None
-    if whole is None:
-        whole = identify_model(problem.of_model(info), methods.method(info), run)
-    return with_trials(whole, found, None if rest is part else float(part.t[-1]))
-
-
-def best_of_several(problem: Problem, methods: MethodChoice, run: Run) -> Identification:
-    """Identify the model that describes several records best.
+    Models whose weights follow by least squares come first, and all of them, unless one leaves
+    nothing but noise; those after the first begin with its history, creep, drift and dynamics.
+    Models that are searched are tried where none of these comes near the noise.
 
     Parameters
     ----------
     problem : Problem
         The records, of any model.
-    methods, run : MethodChoice, Run
-        As for `identify_best`.
+    methods : MethodChoice
+        The methods.
+    run : Run
+        How it is run.
 
     Returns
     -------
@@ -117,86 +94,202 @@ def best_of_several(problem: Problem, methods: MethodChoice, run: Run) -> Identi
     ParameterError, DataError, NumericalError, Interrupted
         As for `identify`.
     """
-    records = problem.records
-    pairs = [two_parts(one.data) for one in records]
-    apart = all(part is not rest for part, rest in pairs)
-    of_trials = methods.of_trials() if apart else methods
-    first, rests = problem, [one.data for one in records]
-    if apart:
-        halves = zip(records, pairs, strict=True)
-        first = replace(
-            problem, records=tuple(replace(one, data=part) for one, (part, _) in halves)
-        )
-        rests = [rest for _, rest in pairs]
-    counts = np.array([one.weight * len(rest) for one, rest in zip(records, rests, strict=True)])
-    found: list[tuple[Trial, ModelInfo]] = []
+    parts = [two_parts(record.data) for record in problem.records]
+    one_loop = any(few for _, _, few in parts)
+    halves = zip(problem.records, parts, strict=True)
+    first = replace(
+        problem, records=tuple(replace(record, data=part) for record, (part, _, _) in halves)
+    )
+    trials = _Trials(first, methods.of_trials(), run, [rest for _, rest, _ in parts])
+    infos = models_tried(problem.records[0].data, problem.parameters)
+    for info in infos:
+        if info.searched and trials.least < NEAR_NOISE:
+            break
+        if trials.run(info):
+            break
+    if not trials.found:
+        raise trials.refused or DataError("no model could be fitted")
+    best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
+    fit = identify_model(problem.of_model(best.info), methods.method(best.info), run)
+    return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A model that was tried."""
+
+    trial: Trial
+    info: ModelInfo
+    # Whether its inverse is ill-conditioned.
+    ill: bool
+    # Its structure, where least squares have found it.
+    start: Structure | None
+
+
+@dataclass
+class _Trials:
+    """Trials on the first parts of records, judged on the rests."""
+
+    problem: Problem
+    methods: MethodChoice
+    how: Run
+    rests: list[Dataset]
+    found: list[Tried] = field(default_factory=list)
     refused: Exception | None = None
-    fit: Identification | None = None
-    for info in models_tried(problem.records[0].data, problem.parameters):
+    # Least residual so far, in multiples of the noise.
+    least: float = math.inf
+    # Structure of the first fit by least squares.
+    start: Structure | None = None
+
+    def run(self, info: ModelInfo) -> bool:
+        """Try a model; return whether it leaves nothing but noise."""
+        begun = time.perf_counter()
+        problem, method = self.problem.of_model(info), self.methods.method(info)
         try:
-            fit = identify_model(first.of_model(info), of_trials.method(info), run)
+            fit = identify_model(problem, method, self.how, self.start)
             left = [
-                rest.y - fit.simulate(rest, offset=own.offset).x
-                for rest, own in zip(rests, fit.records, strict=True)
+                rest.y - fit.simulate(rest, offset=record.offset).x
+                for rest, record in zip(self.rests, fit.records, strict=True)
             ]
         except (DataError, NumericalError) as error:
-            refused = refused or error
-            continue
-        rms = np.array([math.sqrt(float(np.mean(one**2))) for one in left])
-        whole = math.sqrt(float(counts @ rms**2) / float(counts.sum()))
-        found.append((Trial(info.name, info.title, whole), info))
-        noise = [sample_noise(rest.y) for rest in rests]
-        if np.all(rms < AS_NOISE * np.array(noise)) and all(is_white(one) for one in left):
-            break
-    if not found or fit is None:
-        raise refused or DataError("no model could be fitted")
-    best, info = best_of(found)
-    if apart or best is not found[-1][0]:
-        fit = identify_model(problem.of_model(info), methods.method(info), run)
-    return with_trials(fit, found, float(first.records[0].data.t[-1]) if apart else None)
+            self.refused = self.refused or error
+            return False
+        if isinstance(method, LeastSquares):
+            self.start = self.start or Structure.of(fit)
+        records = self.problem.records
+        counts = np.array(
+            [one.weight * len(rest) for one, rest in zip(records, self.rests, strict=True)]
+        )
+        pairs = list(zip(self.rests, left, strict=True))
+        squares = np.array([judged(rest, one) for rest, one in pairs])
+        rms = math.sqrt(float(counts @ squares) / float(counts.sum()))
+        ill = bool(fit.model._notes(lambda: fit._responses[0]))
+        seconds = time.perf_counter() - begun
+        start = Structure.of(fit) if isinstance(method, LeastSquares) else None
+        trial = Trial(info.name, info.title, rms, seconds)
+        self.found.append(Tried(trial, info, ill, start))
+        # Of a quick motion, differences from sample to sample are not the noise's alone.
+        noise = np.array([max(sample_noise(rest.y), repeated(rest)) for rest in self.rests])
+        counted = [rest.counted(one) for rest, one in pairs]
+        plain = np.array([math.sqrt(float(np.mean(one**2))) for one in counted])
+        self.least = min(self.least, float(np.max(plain / np.maximum(noise, 1e-300))))
+        return bool(np.all(plain < AS_NOISE * noise)) and all(is_white(one) for one in counted)
 
 
-def best_of(found: Sequence[tuple[Trial, ModelInfo]]) -> tuple[Trial, ModelInfo]:
+def judged(data: Dataset, left: Array) -> float:
+    """Return the mean square of a residual [m^2], each amplitude and rate of the drive alike.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record, of n samples.
+    left : ndarray, shape (n,)
+        The residual [m].
+
+    Returns
+    -------
+    float
+        Mean over the classes of blocks, between reversals, that differ in amplitude or rate.
+    """
+    turns = _core.turns(data.u, 0.05 * float(np.ptp(data.u)))
+    # Parts of blocks at the ends differ in amplitude by chance.
+    blocks = [slice(a, b) for a, b in pairwise(turns)]
+    if len(blocks) < 2:
+        return float(np.mean(data.counted(left) ** 2))
+    if data.left_out is not None:
+        left = np.where(data.left_out, np.nan, left)
+    size = np.array([np.ptp(data.u[block]) for block in blocks])
+    rate = size / np.array([block.stop - block.start for block in blocks])
+    classes: dict[tuple[bool, bool], list[slice]] = {}
+    for block, large, fast in zip(blocks, _upper(size), _upper(rate), strict=True):
+        classes.setdefault((bool(large), bool(fast)), []).append(block)
+    means = [
+        np.nanmean(np.concatenate([left[one] for one in some]) ** 2) for some in classes.values()
+    ]
+    return float(np.mean(means))
+
+
+def _upper(values: Array) -> NDArray[np.bool_]:
+    """Return which values are in the upper class; none where all are alike."""
+    low, high = float(np.min(values)), float(np.max(values))
+    if high <= APART_IN_SIZE * low:
+        return np.zeros(values.size, dtype=np.bool_)
+    return values > math.sqrt(max(low, 1e-12 * high) * high)
+
+
+def repeated(data: Dataset) -> float:
+    """Return what of a displacement does not repeat with a periodic drive, rms [m]; else 0.
+
+    No model of the drive explains more than what repeats.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    float
+        Standard deviation of the difference between periods, over the root of 2.
+    """
+    u = data.u - data.u.mean()
+    turns = np.array(_core.turns(data.u, 0.5 * float(np.ptp(data.u))), dtype=np.intp)
+    if turns.size < 4:
+        return 0.0
+    period = round(float(np.median(turns[2:] - turns[:-2])))
+    near = [p for p in (period - 1, period, period + 1) if 8 <= p <= u.size // 2]
+    if not near:
+        return 0.0
+    gap = {p: float(np.std(u[p:] - u[:-p])) for p in near}
+    best = min(gap, key=gap.__getitem__)
+    if gap[best] > SAME_PERIOD * float(np.std(u)):
+        return 0.0
+    return float(np.std(data.y[best:] - data.y[:-best])) / math.sqrt(2.0)
+
+
+def best_of(found: Sequence[Tried], better: float = BETTER) -> Tried:
     """Return the best trial, or one before it in the list that is hardly worse.
 
     Parameters
     ----------
-    found : sequence of (Trial, ModelInfo)
-        At least one, in the order in which they were tried.
+    found : sequence of Tried
+        At least one, in the order in which they were tried. One whose inverse is ill-conditioned
+        is taken only where those of all are.
+    better : float, optional
+        Share by which another has to be better than one before it.
 
     Returns
     -------
-    Trial, ModelInfo
+    Tried
         The one to take.
     """
-    best = found[0]
-    for other in found[1:]:
-        if other[0].rms < (1.0 - BETTER) * best[0].rms:
+    well = [one for one in found if not one.ill] or list(found)
+    best = well[0]
+    for other in well[1:]:
+        if other.trial.rms < (1.0 - better) * best.trial.rms:
             best = other
     return best
 
 
-def with_trials(
-    fit: Identification, found: Sequence[tuple[Trial, ModelInfo]], until: float | None
-) -> Identification:
+def with_trials(fit: Identification, found: Sequence[Tried], until: float) -> Identification:
     """Put into a result what was tried before it.
 
     Parameters
     ----------
     fit : Identification
         The best model.
-    found : sequence of (Trial, ModelInfo)
+    found : sequence of Tried
         What was tried.
-    until : float or None
-        End of the part that the trials were fitted to [s]; None where that was the whole.
+    until : float
+        End of the part that the trials were fitted to [s].
 
     Returns
     -------
     Identification
         The same with its trials, in its file too.
     """
-    trials = tuple(sorted((one for one, _ in found), key=lambda one: one.rms))
-    models = {one.model: {"rms": one.rms, "unit": "m"} for one in trials}
+    trials = tuple(sorted((one.trial for one in found), key=lambda trial: trial.rms))
+    models = {trial.model: {"rms": trial.rms, "unit": "m"} for trial in trials}
     details = {"selection": {"fitted_until_s": until, "models": models}}
     selection = Selection(trials=trials, fitted_until=until)
     return replace(fit, selection=selection, details={**fit.details, **details})
@@ -217,13 +310,13 @@ def models_tried(data: Dataset, parameters: Mapping[str, object]) -> list[ModelI
     list of ModelInfo
         In the order in which they are tried; where a parameter is given, those that are searched.
     """
-    names = OF_FORCE if data.drive_unit == "N" else OF_VOLTS
+    names = OF_FORCE if data.drive_unit == "N" else (*LEAST_SQUARES, *SEARCHED)
     infos = [model_named(name) for name in names]
     return [info for info in infos if info.searched or not parameters]
 
 
-def two_parts(data: Dataset) -> tuple[Dataset, Dataset]:
-    """Part a record for trials; the whole twice where the drive turns too seldom.
+def two_parts(data: Dataset) -> tuple[Dataset, Dataset, bool]:
+    """Part a record for trials.
 
     Parameters
     ----------
@@ -233,15 +326,20 @@ def two_parts(data: Dataset) -> tuple[Dataset, Dataset]:
     Returns
     -------
     part, rest : Dataset
-        To fit, and to judge on.
+        To fit, and to judge on: the last quarter where the drive turns too seldom.
+    few : bool
+        Whether it does.
     """
     turns = np.array(_core.turns(data.u, 0.2 * float(np.ptp(data.u))), dtype=np.intp)
     for place in turns[np.argsort(np.abs(turns - FITTED * len(data)))]:
         before, after = int(np.sum(turns < place)), int(np.sum(turns >= place))
         if before >= TURNS and after >= TURNS:
             middle = float(data.t[place])
-            return data[data.t[0] : middle], data[middle:]
-    return data, data
+            return data[data.t[0] : middle], data[middle:], False
+    if len(data) < LEAST_SAMPLES:
+        return data, data, True
+    middle = float(data.t[int(FITTED_OF_ONE_LOOP * (len(data) - 1))])
+    return data[data.t[0] : middle], data[middle:], True
 
 
 def is_white(rest: Array) -> bool:

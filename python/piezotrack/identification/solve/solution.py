@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..problem.problem import AUTO
 from .one_model import identify_model
-from .selection import best_of_several, identify_best
+from .selection import identify_best
 
 if TYPE_CHECKING:
     from ..fitted.identification import Identification
@@ -41,5 +41,4 @@ def solve(problem: Problem, methods: MethodChoice, run: Run) -> Identification:
     """
     if problem.model != AUTO:
         return identify_model(problem, methods.method(problem.info), run)
-    best = identify_best if len(problem.records) == 1 else best_of_several
-    return best(problem, methods, run)
+    return identify_best(problem, methods, run)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
     from ..problem.problem import Problem
     from ..problem.records import Record
 
-__all__ = ["solve_least_squares"]
+__all__ = ["Structure", "solve_least_squares"]
 
 MOST_RELAXATIONS = 8
 DYNAMICS = ("time_constant", "frequency", "damping_ratio")
@@ -43,8 +45,37 @@ CHOSEN = (
 )
 
 
+@dataclass(frozen=True)
+class Structure:
+    """Structure of a fit beside its signals, from which that of another model begins."""
+
+    histories: list[str]
+    drifts: list[float | None]
+    creep_times: list[float]
+    dynamics: list[float]
+
+    @classmethod
+    def of(cls, fit: Identification) -> Structure:
+        """Return that of a fit by least squares."""
+        model: Any = fit.model
+        creep = zip(model.creep_weights, model.creep_times, strict=True)
+        modes = zip(
+            model.mode_weights, model.mode_frequencies, model.mode_damping_ratios, strict=True
+        )
+        main = (model.time_constant, model.frequency, model.damping_ratio)
+        return cls(
+            histories=[
+                one.start.history if one.start and one.start.history != "rest" else "virgin"
+                for one in fit.records
+            ],
+            drifts=[one.drift.time if one.drift else None for one in fit.records],
+            creep_times=[time for weight, time in creep if weight > 0.0],
+            dynamics=[*(one for one in main if one is not None), *chain(*modes)],
+        )
+
+
 def solve_least_squares(
-    problem: Problem, settings: LeastSquares, threads: int = 0
+    problem: Problem, settings: LeastSquares, threads: int = 0, start: Structure | None = None
 ) -> Identification:
     """Identify a stage by least squares.
 
@@ -56,6 +87,8 @@ def solve_least_squares(
         Settings.
     threads : int, optional
         All cores where it is 0.
+    start : Structure, optional
+        Structure to begin with, where nothing of it is given.
 
     Returns
     -------
@@ -80,6 +113,7 @@ def solve_least_squares(
         zones=_zones(settings, info),
         creep_times=_times(settings, longest),
         dynamics=settings.dynamics or "none",
+        start=start if settings.creep == settings.dynamics == "auto" else None,
         threads=threads,
     )
     model = stage_class(info)

@@ -139,7 +139,9 @@ def plot_time(
     above, below = axes_or_new(axes, 2)
     unit, scale = best_length_unit(data.stroke)
     error = data.y - run.x
-    small, fine = best_length_unit(float(np.abs(error).max()))
+    if data.left_out is not None:
+        error[data.left_out] = np.nan
+    small, fine = best_length_unit(float(np.abs(data.counted(error)).max()))
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
         kept = thinned(y)
         above.plot(data.t[kept], scale * y[kept], **style)
@@ -378,7 +380,8 @@ def what_was_fitted(fit: Identification, own: FittedRecord | None = None) -> str
 
 def what_was_shown(model: IdentifiedModel, record: Dataset, run: Response) -> str:
     """Write model, record, window and error on any record, as the title of its pictures."""
-    rms = 100.0 * float(np.sqrt(np.mean((record.y - run.x) ** 2))) / model.stroke
+    data = record.without_far_readings()
+    rms = 100.0 * float(np.sqrt(np.mean(data.counted(data.y - run.x) ** 2))) / model.stroke
     fitted = "" if model.fitted_on(record) else ", not fitted"
     return f"{named(model, record)}{fitted}: {rms:.3g} % of stroke rms"
 

@@ -155,17 +155,19 @@ def _size(data: Dataset) -> str:
 
 
 def _trials(fit: Identification) -> list[str]:
-    """Say which models were tried, and on what they were judged."""
+    """List the models that were tried, and on what they were judged."""
     chosen = fit.selection
     if chosen is None:
         return []
-    scores = ", ".join(f"{one.title} {100 * one.rms / fit.stroke:.3g} %" for one in chosen.trials)
-    where = (
-        "on the part fitted, as the window is too short for another"
-        if chosen.fitted_until is None
-        else f"after {chosen.fitted_until:.4g} s, fitted before that"
-    )
-    return [f"      chosen by the rms {where}: {scores}"]
+    width = max(len(trial.title) for trial in chosen.trials)
+    return [
+        f"      chosen by the rms after {chosen.fitted_until:.4g} s, fitted before that:",
+        *(
+            f"        {trial.title:<{width}}  {100 * trial.rms / fit.stroke:7.3g} %"
+            f"  {trial.seconds:5.1f} s"
+            for trial in chosen.trials
+        ),
+    ]
 
 
 def _estimates(fit: Identification) -> list[str]:

@@ -25,7 +25,7 @@ pub use experiments::step_response::{
 pub use identification::{Identification, OwnResult, identify, identify_together};
 pub use least_squares::{
     CreepKind, DynamicsKind, LeastSquaresFit, NodesKind, RecordFit, Settings as WeightsSettings,
-    WeightsDelay, WeightsRecord, identify_weights,
+    Structure, WeightsDelay, WeightsRecord, identify_weights,
 };
 pub use parameters::bounds;
 pub use parameters::candidate::{

@@ -1,10 +1,11 @@
 //! Identification of a stage's weights by least squares.
 
 use piezotrack_core::identify::{
-    CreepKind, DynamicsKind, LeastSquaresFit, NodesKind, RecordFit, WeightsSettings,
-    identify_weights, resonances,
+    CreepKind, DynamicsKind, History, LeastSquaresFit, NodesKind, RecordFit, Structure,
+    WeightsSettings, identify_weights, resonances,
 };
 use piezotrack_core::math::{FREE, NOT_NEGATIVE, Rows};
+use piezotrack_core::models::{Dynamics, Mode};
 use piezotrack_core::signal::{Drive, Stop};
 use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
@@ -100,10 +101,37 @@ fn dynamics_named(name: &str) -> Result<DynamicsKind> {
     }
 }
 
+/// A `Structure`.
+#[derive(FromPyObject)]
+struct PyStructure {
+    histories: Vec<String>,
+    drifts: Vec<Option<f64>>,
+    creep_times: Vec<f64>,
+    dynamics: Vec<f64>,
+}
+
+impl PyStructure {
+    fn structure(self) -> Result<Structure> {
+        let histories: Result<Vec<_>> =
+            self.histories.iter().map(|name| History::named(name)).collect();
+        let dynamics = match self.dynamics[..] {
+            [time] => Dynamics::First { time },
+            [frequency, damping_ratio] => Dynamics::Second { frequency, damping_ratio },
+            [frequency, damping_ratio, weight, second, damping] => {
+                let further = Mode { weight, frequency: second, damping_ratio: damping };
+                Dynamics::modes(frequency, damping_ratio, &[further])?
+            }
+            _ => Dynamics::None,
+        };
+        let records = histories?.into_iter().zip(self.drifts).collect();
+        Ok(Structure { records, creep_times: self.creep_times, dynamics })
+    }
+}
+
 /// Identifies a stage by least squares; what is None is chosen.
 #[pyfunction]
 #[pyo3(name = "identify_weights", signature = (problem, *, count, thresholds, zones, creep_times,
-    dynamics, threads))]
+    dynamics, start, threads))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn fit_weights(
     py: Python<'_>,
@@ -113,6 +141,7 @@ fn fit_weights(
     zones: usize,
     creep_times: Option<Vec<f64>>,
     dynamics: &str,
+    start: Option<PyStructure>,
     threads: usize,
 ) -> PyResult<PyLeastSquaresFit> {
     let question = problem.question()?;
@@ -126,7 +155,8 @@ fn fit_weights(
         };
         let creep = creep_times.map_or(CreepKind::Auto, CreepKind::Times);
         let dynamics = dynamics_named(dynamics)?;
-        Ok((records?, WeightsSettings { nodes, zones, creep, dynamics }))
+        let start = start.map(PyStructure::structure).transpose()?;
+        Ok((records?, WeightsSettings { nodes, zones, creep, dynamics, start }))
     };
     let (records, settings) = checked().map_err(|error| raise(&error))?;
     let job = |stop: Stop<'_>| identify_weights(question.model, &records, &settings, stop);

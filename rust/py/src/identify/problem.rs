@@ -48,6 +48,7 @@ struct PyDataset<'py> {
 struct PySamples<'py> {
     u: Bound<'py, PyAny>,
     y: Bound<'py, PyAny>,
+    left_out: Option<Vec<bool>>,
 }
 
 /// Whether a delay is fitted, its value or its bounds, s.
@@ -101,6 +102,8 @@ pub struct Question {
 pub struct OneRecord {
     u: Vec<f64>,
     y: Vec<f64>,
+    /// Samples whose displacement does not count; none where empty.
+    left_out: Vec<bool>,
     dt: f64,
     hold: Hold,
     start: usize,
@@ -172,26 +175,41 @@ impl PyRecord<'_> {
             PyDrift::Time(time) => DriftKind::Time(time),
         });
         let (u, y) = (samples("u", &full.u)?, samples("y", &full.y)?);
+        let left_out = full.left_out.unwrap_or_default();
         let Self { offset, weight, .. } = self;
-        Ok(OneRecord { u, y, dt, hold, start, offset, delay, drift, history, label, weight })
+        Ok(OneRecord {
+            u,
+            y,
+            left_out,
+            dt,
+            hold,
+            start,
+            offset,
+            delay,
+            drift,
+            history,
+            label,
+            weight,
+        })
     }
 }
 
 impl OneRecord {
     /// The record.
     pub fn record(&self) -> Result<Record<'_>> {
-        let record = Record::new(&self.u, &self.y, self.dt, self.hold, self.start);
+        let record = Record::new(&self.u, &self.y, self.dt, self.hold, self.start)
+            .and_then(|record| record.without(&self.left_out));
         record.map_err(|error| error.of(&self.label))?.among(&self.label, self.weight)
     }
 
     /// The record for least squares, which take the drift that it shows where nothing is said.
     pub fn weights_record(&self) -> Result<WeightsRecord<'_>> {
-        let Record { drive, y, weight, .. } = self.record()?;
+        let Record { drive, y, weight, left_out, .. } = self.record()?;
         let Self { start, offset, history, .. } = *self;
         let shown = if offset { DriftKind::Auto } else { DriftKind::None };
         let drift = self.drift.unwrap_or(shown);
-        let one =
-            WeightsRecord { history, offset, drift, weight, ..WeightsRecord::of(drive, y, start) };
+        let of_all = WeightsRecord::of(drive, y, start);
+        let one = WeightsRecord { history, offset, drift, weight, left_out, ..of_all };
         one.delayed(self.delay).map_err(|error| error.of(&self.label))
     }
 }

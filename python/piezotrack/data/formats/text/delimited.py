@@ -13,7 +13,15 @@ import numpy as np
 
 from ...._support.messages import quoted
 from ...columns import Columns
-from ...text_fields import are_titles, delimiter_of, field_fault, number_of, split_fields
+from ...missing import USE_MISSING
+from ...text_fields import (
+    are_titles,
+    delimiter_of,
+    field_fault,
+    is_missing,
+    number_of,
+    split_fields,
+)
 from ..table import MOST_COLUMNS, Format, Table
 from .dates import instant_of, is_ambiguous
 
@@ -252,7 +260,8 @@ class TextTable(Table):
             )
         except ValueError:
             return self._table_by_line(main, shape, swap)
-        if table.shape != shape or not np.isfinite(table[:, [c.index for c in main]]).all():
+        needed = table[:, [column.index for column in main]]
+        if table.shape != shape or not np.isfinite(needed).all():
             return self._table_by_line(main, shape, swap)
         return table
 
@@ -272,9 +281,13 @@ class TextTable(Table):
                 values[index] = _seconds(fields[index], first)
             for column in main:
                 if not math.isfinite(values[column.index]):
+                    missing = column.index in self.signals and is_missing(fields[column.index])
+                    if missing and self.takes_missing:
+                        continue
                     fault = self._fault(fields[column.index], column, swap)
                     ends = not fields[-1] and row == shape[0] - 1
-                    raise self.source.error(f"{fault}{CUT_OFF if ends else ''}", line)
+                    remedy = CUT_OFF if ends else USE_MISSING if missing else ""
+                    raise self.source.error(f"{fault}{remedy}", line)
             table[row] = values
         return table
 

@@ -172,12 +172,12 @@ impl<'a> Evaluator<'a> {
         sums: &CreepSums,
         creep_weights: CreepWeights,
     ) -> Costs {
-        self.residuals.costs(sums, Some(creep_weights), self.record().window.len(), false)
+        self.residuals.costs(sums, Some(creep_weights), self.record().samples(), false)
     }
 
     /// Cost, and weights of the creep, from sums over the whole window.
     pub(in crate::identify) fn creep_cost(&self, sums: &CreepSums) -> CreepCost {
-        sums.cost(self.record().window.len(), self.problem.offset)
+        sums.cost(self.record().samples(), self.problem.offset)
     }
 }
 

@@ -153,6 +153,9 @@ pub(in crate::identify) struct ResidualSums<'a, const V: usize, S: Simd, R> {
     stop: Stop<'a>,
     sum: Lanes<S, V>,
     squares: Lanes<S, V>,
+    /// Samples that count, so far and in all.
+    seen: usize,
+    samples: usize,
     reading: R,
     /// Sub-steps in a sampling interval.
     substeps: f64,
@@ -231,6 +234,8 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
             stop,
             sum: zero,
             squares: zero,
+            seen: 0,
+            samples: of.record.samples(),
             reading,
             substeps,
             last,
@@ -266,10 +271,8 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
     ///
     /// A candidate's verdict is its own, whatever the other lanes hold, so it does not depend on
     /// how candidates are bundled.
-    fn hopeless(&mut self, k: usize) -> bool {
-        let Self { of, candidates, stop, .. } = *self;
-        let (seen, samples) =
-            ((k + 1).saturating_sub(of.record.window.start), of.record.window.len());
+    fn hopeless(&mut self) -> bool {
+        let Self { of, candidates, stop, seen, samples, .. } = *self;
         if seen > 0 && seen < samples {
             let share = libm::sqrt(index(seen) / index(samples));
             for (lane, candidate) in candidates.iter().enumerate() {
@@ -309,7 +312,7 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
 
     /// The costs, where the lanes `ended` or were given up before, and what was kept.
     pub fn conclude(self, ended: bool) -> Vec<Simulated> {
-        let samples = self.of.record.window.len();
+        let samples = self.samples;
         let lanes = self.candidates.len();
         let settled = (0..lanes).map(|lane| {
             let sums = (self.verdicts[lane].is_none() && ended).then(|| self.sums(lane));
@@ -404,7 +407,12 @@ impl<const V: usize, S: Simd, M, R: Reading<Lanes<S, V>>> Observer<Lanes<S, V>, 
             self.kept.push(x);
             self.kept.extend(self.creep.iter().map(|one| one.output));
         }
-        if k >= record.window.start {
+        if k >= record.window.start && !record.counts(k) {
+            if let Some(drift) = &mut self.drift {
+                drift.pass();
+            }
+        } else if k >= record.window.start {
+            self.seen += 1;
             let deviation = x.like(record.y[k] - self.of.centre) - x;
             self.sum = self.sum + deviation;
             self.squares = deviation.mul_add(deviation, self.squares);
@@ -417,8 +425,8 @@ impl<const V: usize, S: Simd, M, R: Reading<Lanes<S, V>>> Observer<Lanes<S, V>, 
         }
     }
 
-    fn give_up(&mut self, k: usize) -> bool {
-        self.hopeless(k)
+    fn give_up(&mut self, _k: usize) -> bool {
+        self.hopeless()
     }
 }
 

@@ -49,9 +49,9 @@ impl<'a> Records<'a> {
     /// Several, with the weights that they have; their problems share the coordinates of the stage.
     #[must_use]
     pub(in crate::identify) fn new(evaluators: Vec<Evaluator<'a>>) -> Self {
-        let counts = |one: &Evaluator<'_>| one.record().weight * index(one.record().window.len());
+        let counts = |one: &Evaluator<'_>| one.record().weight * index(one.record().samples());
         let total: f64 = evaluators.iter().map(counts).sum();
-        let samples = evaluators.iter().map(|one| one.record().window.len()).sum();
+        let samples = evaluators.iter().map(|one| one.record().samples()).sum();
         let mut coordinates = Vec::new();
         let mut own = vec![Vec::new(); evaluators.len()];
         let shared = evaluators.first().into_iter().flat_map(|one| one.problem().free());

@@ -160,12 +160,22 @@ impl Evaluator<'_> {
     /// Level that the sensor adds to a displacement: offset, and drift with this time constant.
     fn level(&self, time: Option<f64>, stride: usize) -> Level {
         let offset = self.problem().offset;
+        let left_out = self.left_out(stride);
         let drift = time.map(|time| {
             let mut shape = self.faded(time, stride);
-            centre(&mut shape);
+            centre(&mut shape, &left_out);
+            clear(&mut shape, &left_out);
             (time, product(&shape, &shape), shape)
         });
-        Level { offset, drift }
+        Level { offset, drift, left_out }
+    }
+
+    /// Rows whose displacement does not count, of every `stride`-th sample of the window.
+    fn left_out(&self, stride: usize) -> Vec<usize> {
+        let record = self.record();
+        let samples = record.window.clone().step_by(stride).enumerate();
+        let rows = samples.filter(|(_, k)| !record.counts(*k)).map(|(row, _)| row);
+        if record.left_out.is_empty() { Vec::new() } else { rows.collect() }
     }
 
     /// Measured less simulated at a place with its weights of the creep, less what the sensor adds.
@@ -234,14 +244,17 @@ struct Level {
     /// Time constant of a drift, s, the sum of the squares of a drift of 1, and its values, about
     /// their mean.
     drift: Option<(f64, f64, Vec<f64>)>,
+    /// Rows that do not count.
+    left_out: Vec<usize>,
 }
 
 impl Level {
-    /// Takes it off a column.
+    /// Takes it off a column, whose rows that do not count become 0.
     fn take_off(&self, values: &mut [f64]) {
         if self.offset {
-            centre(values);
+            centre(values, &self.left_out);
         }
+        clear(values, &self.left_out);
         if let Some((_, square, shape)) = &self.drift {
             let part = product(shape, values) / square;
             for (value, g) in values.iter_mut().zip(shape) {
@@ -257,9 +270,17 @@ impl Level {
     }
 }
 
-/// Takes the mean off.
-fn centre(values: &mut [f64]) {
-    let mean = mean(values);
+/// Sets rows to 0.
+fn clear(values: &mut [f64], rows: &[usize]) {
+    for &row in rows {
+        values[row] = 0.0;
+    }
+}
+
+/// Takes the mean of the rows that count off.
+fn centre(values: &mut [f64], left_out: &[usize]) {
+    clear(values, left_out);
+    let mean = mean(values, values.len() - left_out.len());
     for value in values {
         *value -= mean;
     }
@@ -297,8 +318,8 @@ pub(in crate::identify) fn product(a: &[f64], b: &[f64]) -> f64 {
     sums.into_iter().chain(rest).sum()
 }
 
-/// Mean of a column.
-fn mean(values: &[f64]) -> f64 {
+/// Sum of a column over a count.
+fn mean(values: &[f64], count: usize) -> f64 {
     let (all, rest) = values.as_chunks::<SUMS>();
     let mut sums = [0.0; SUMS];
     for values in all {
@@ -306,5 +327,5 @@ fn mean(values: &[f64]) -> f64 {
             *sum += value;
         }
     }
-    sums.iter().chain(rest).sum::<f64>() / index(values.len())
+    sums.iter().chain(rest).sum::<f64>() / index(count)
 }

@@ -61,7 +61,7 @@ impl<'a> Common<'a> {
             let dt = one.drive.dt * index(kept.every);
             let start = one.start.div_ceil(kept.every);
             let drive = Drive { u: &kept.u, dt, hold: one.drive.hold };
-            WeightsRecord { drive, y: &kept.y, start, ..*one }
+            WeightsRecord { drive, y: &kept.y, start, left_out: &kept.left_out, ..*one }
         };
         let records: Vec<WeightsRecord<'b>> = self.records.iter().zip(kept).map(thin).collect();
         let weights =
@@ -107,12 +107,14 @@ pub(super) struct Thinned {
     every: usize,
     u: Vec<f64>,
     y: Vec<f64>,
+    left_out: Vec<bool>,
 }
 
 impl Thinned {
     pub fn of(record: &WeightsRecord<'_>, every: usize) -> Self {
         let thin = |values: &[f64]| values.iter().copied().step_by(every).collect::<Vec<f64>>();
-        Self { every, u: thin(record.drive.u), y: thin(record.y) }
+        let left_out = record.left_out.iter().copied().step_by(every).collect();
+        Self { every, u: thin(record.drive.u), y: thin(record.y), left_out }
     }
 }
 

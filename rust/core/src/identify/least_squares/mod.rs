@@ -17,5 +17,5 @@ mod weights_record;
 
 pub use identify_weights::identify_weights;
 pub use result::{LeastSquaresFit, RecordFit};
-pub use settings::{CreepKind, DynamicsKind, NodesKind, Settings};
+pub use settings::{CreepKind, DynamicsKind, NodesKind, Settings, Structure};
 pub use weights_record::{WeightsDelay, WeightsRecord};

@@ -1,5 +1,8 @@
 //! Settings of an identification by least squares, and the constants that its steps share.
 
+use crate::identify::records::history::History;
+use crate::models::Dynamics;
+
 /// Settings of a fit: the unknowns of the stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -11,6 +14,19 @@ pub struct Settings {
     pub creep: CreepKind,
     /// Which dynamics.
     pub dynamics: DynamicsKind,
+    /// Structure to begin with.
+    pub start: Option<Structure>,
+}
+
+/// Structure of a fit beside its signals, from which that of another model begins.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Structure {
+    /// History and time constant of the drift, s, of each record.
+    pub records: Vec<(History, Option<f64>)>,
+    /// Time constants of the creep, s.
+    pub creep_times: Vec<f64>,
+    /// Dynamics.
+    pub dynamics: Dynamics,
 }
 
 /// Thresholds of plays, or levels of a grid.
@@ -70,3 +86,13 @@ pub(super) const SAME: f64 = 1.01;
 pub(super) const FIRST_SHARE: f64 = 0.005;
 
 pub(super) const MODE_GAIN: f64 = 0.02;
+
+/// Shares of the deviation that a history, creep, a drift and a lag have to take away.
+pub(super) const HISTORY_GAIN: f64 = 0.02;
+pub(super) const CREEP_GAIN: f64 = 0.015;
+pub(super) const DRIFT_GAIN: f64 = 0.015;
+pub(super) const LAG_GAIN: f64 = 0.01;
+
+/// Share of the deviation that a mode has to take away whose resonance no record shows: it would
+/// also explain some of the creep, or of what the plays do not.
+pub(super) const UNSEEN_GAIN: f64 = 0.15;

@@ -27,6 +27,8 @@ pub struct WeightsRecord<'a> {
     pub delay: WeightsDelay,
     /// How much a sample counts beside those of other records.
     pub weight: f64,
+    /// Samples whose displacement does not count, one entry for each; none where empty.
+    pub left_out: &'a [bool],
 }
 
 /// Delay of a reading in a fit.
@@ -52,6 +54,7 @@ impl<'a> WeightsRecord<'a> {
             drift: DriftKind::None,
             delay,
             weight: 1.0,
+            left_out: &[],
         }
     }
 
@@ -84,7 +87,12 @@ impl<'a> WeightsRecord<'a> {
         if k > 0 && self.drive.hold == Hold::First { self.drive.dt } else { f64::INFINITY }
     }
 
-    /// Samples that count.
+    /// Whether the displacement at a sample counts.
+    pub(super) fn counts(&self, k: usize) -> bool {
+        !self.left_out.get(k).is_some_and(|left_out| *left_out)
+    }
+
+    /// Samples of the window.
     pub(super) fn samples(&self) -> usize {
         self.y.len().saturating_sub(self.start)
     }

@@ -145,6 +145,12 @@ impl<N: Number> Drifting<N> {
         for (sum, output) in sums.outputs.iter_mut().zip(outputs) {
             *sum = g.mul_add(output, *sum);
         }
-        self.now = g * self.keep - self.less;
+        self.pass();
+    }
+
+    /// Goes to the next sample, without adding this one.
+    #[inline(always)]
+    pub fn pass(&mut self) {
+        self.now = self.now * self.keep - self.less;
     }
 }

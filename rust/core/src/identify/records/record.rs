@@ -18,6 +18,8 @@ pub struct Record<'a> {
     pub label: String,
     /// How much each of its samples counts beside those of other records.
     pub weight: f64,
+    /// Samples whose displacement does not count, one entry for each; none where empty.
+    pub left_out: &'a [bool],
 }
 
 impl<'a> Record<'a> {
@@ -56,7 +58,7 @@ impl<'a> Record<'a> {
                  the sensor seems dead or not connected"
             )));
         }
-        Ok(Self { drive, y, window, label: String::new(), weight: 1.0 })
+        Ok(Self { drive, y, window, label: String::new(), weight: 1.0, left_out: &[] })
     }
 
     /// The record as one of several, with its name in messages and its weight beside the others.
@@ -69,6 +71,43 @@ impl<'a> Record<'a> {
         }
         let expected = "a finite number above 0: leave out a record that is not to count";
         Err(Error::parameter("weight", shown(weight), expected).of(label))
+    }
+
+    /// The same without the displacement at some samples; an empty list for none.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where there is not one entry for each sample, [`Error::Data`] where fewer
+    /// than 10 samples are left.
+    pub fn without(self, left_out: &'a [bool]) -> Result<Self> {
+        if !left_out.is_empty() && left_out.len() != self.y.len() {
+            return Err(Error::Shape {
+                name: "left_out".into(),
+                found: format!("{} samples", left_out.len()),
+                expected: format!("{}, as many as u", self.y.len()),
+            });
+        }
+        let record = Self { left_out, ..self };
+        match record.samples() {
+            0..10 => Err(Error::Data(format!(
+                "the window has {} samples that count: expected at least 10",
+                record.samples()
+            ))),
+            _ => Ok(record),
+        }
+    }
+
+    /// Whether the displacement at a sample counts.
+    #[inline]
+    #[must_use]
+    pub fn counts(&self, k: usize) -> bool {
+        !self.left_out.get(k).is_some_and(|left_out| *left_out)
+    }
+
+    /// Number of samples in the window that count.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        let left_out = self.left_out.iter().skip(self.window.start);
+        self.window.len() - left_out.filter(|left_out| **left_out).count()
     }
 
     /// An error of this record among several.

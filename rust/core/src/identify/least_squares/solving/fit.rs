@@ -309,7 +309,8 @@ impl<'a> Fit<'a> {
 
     /// Samples of a record that are judged.
     pub fn judged(&self, r: usize) -> impl Iterator<Item = usize> {
-        self.windows[r].clone().step_by(self.every[r])
+        let record = self.common.records[r];
+        self.windows[r].clone().step_by(self.every[r]).filter(move |&k| record.counts(k))
     }
 
     /// How much a judged sample of a record counts.

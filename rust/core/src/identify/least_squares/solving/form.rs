@@ -30,6 +30,27 @@ pub(in crate::identify::least_squares) enum Form {
 }
 
 impl Form {
+    /// The form of some dynamics, and their numbers.
+    pub fn of(dynamics: &Dynamics) -> (Self, Vec<f64>) {
+        let log = |numbers: &[f64]| numbers.iter().map(|one| libm::log(*one)).collect::<Vec<f64>>();
+        match *dynamics {
+            Dynamics::None => (Self::None, Vec::new()),
+            Dynamics::First { time } => (Self::First, log(&[time])),
+            Dynamics::Second { frequency, damping_ratio } => {
+                (Self::Modes(1), log(&[frequency, damping_ratio]))
+            }
+            Dynamics::Modes(modes) => {
+                let main = modes.all()[0];
+                let mut numbers = log(&[main.frequency, main.damping_ratio]);
+                for mode in modes.further().iter().take(1) {
+                    numbers.push(mode.weight);
+                    numbers.extend(log(&[mode.frequency, mode.damping_ratio]));
+                }
+                (Self::Modes(2), numbers)
+            }
+        }
+    }
+
     /// How many numbers it has.
     pub fn numbers(self) -> usize {
         self.names().len()

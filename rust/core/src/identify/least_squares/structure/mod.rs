@@ -3,6 +3,7 @@
 mod lag;
 mod modes;
 mod nodes;
+mod refinement;
 pub(super) mod selection;
 mod slow_parts;
 mod trials;

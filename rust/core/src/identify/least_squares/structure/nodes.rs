@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use crate::identify::least_squares::common::Common;
-use crate::identify::least_squares::settings::{NodesKind, ROUGH, STEPS, Settings};
+use crate::identify::least_squares::settings::{NodesKind, ROUGH, SAME, STEPS, Settings};
 use crate::identify::least_squares::solving::fit::Fit;
 use crate::math::on_all_threads;
 use crate::models::{MOST_PLAYS, Nodes};
@@ -132,17 +132,19 @@ pub(super) fn choose_nodes(fit: &mut Fit<'_>, settings: &Settings) -> Option<()>
     };
     let found: Option<Vec<_>> =
         on_all_threads(tried(fit.common.of.nodes()), &trials).into_iter().collect();
-    let mut least = (1.0 - PLAYS_GAIN) * foretold(&here);
-    let mut best = None;
-    for (rms, nodes) in found?.into_iter().flatten() {
-        if rms < least {
-            least = (1.0 - PLAYS_GAIN) * rms;
-            best = Some(nodes);
+    let least = (1.0 - PLAYS_GAIN) * foretold(&here);
+    let mut better: Vec<(f64, Vec<f64>)> =
+        found?.into_iter().flatten().filter(|(rms, _)| *rms < least).collect();
+    better.sort_by(|one, other| one.0.total_cmp(&other.0));
+    for (_, nodes) in better {
+        let mut trial = fit.clone();
+        trial.restructure(|trial| trial.nodes = nodes);
+        trial.settle(ROUGH)?;
+        // What foretells the last third has to explain all of the window too.
+        if trial.rms < SAME * fit.rms {
+            *fit = trial;
+            break;
         }
-    }
-    if let Some(thresholds) = best {
-        fit.restructure(|fit| fit.nodes = thresholds);
-        fit.settle(ROUGH)?;
     }
     Some(())
 }

@@ -5,15 +5,18 @@
 use super::lag::{best_lag, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::nodes::{add_once, choose_nodes, few_or_many, spread};
+use super::refinement::{FIRST_ROUNDS, ROUNDS, Refinement};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
 use crate::identify::least_squares::common::{Common, Thinned};
 use crate::identify::least_squares::settings::{
-    CreepKind, DynamicsKind, FIRST_SHARE, MODE_GAIN, NodesKind, ROUGH, SAME, STEPS, Settings,
+    CreepKind, DynamicsKind, FIRST_SHARE, HISTORY_GAIN, MODE_GAIN, NodesKind, ROUGH, SAME, STEPS,
+    Settings, Structure, UNSEEN_GAIN,
 };
 use crate::identify::least_squares::solving::fit::{Beginning, Fit};
 use crate::identify::least_squares::solving::form::Form;
 use crate::identify::least_squares::weights_record::WeightsRecord;
+use crate::identify::parameters::drift::DriftKind;
 use crate::identify::records::history::History;
 use crate::math::least;
 use crate::signal::{index, range};
@@ -25,11 +28,7 @@ const SHAPE_ROUNDS: usize = 20;
 /// middle of its range: what a record does not determine is not changed.
 const SHAPE_GAIN: f64 = 0.1;
 
-/// Shares of the deviation that histories and modes have to take away.
-const HISTORY_GAIN: f64 = 0.02;
-/// Share of the deviation that a mode has to take away whose resonance no record shows, and how far
-/// it is above the drive: it would also explain some of the creep, or of what the plays do not.
-const UNSEEN_GAIN: f64 = 0.15;
+/// How far a mode that no record shows is above the drive.
 const ABOVE_DRIVE: f64 = 10.0;
 
 /// Share of the deviation that dead zones in other places have to take away.
@@ -87,26 +86,127 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     search_shape(&mut fit)?;
     place_corners(&mut fit, settings.zones);
     fit.settle(ROUGH)?;
+    if let Some(start) = &settings.start {
+        return resumed(fit, settings, start);
+    }
     let mode = first_mode(&mut fit, settings)?;
     if let CreepKind::Times(times) = &settings.creep {
         fit.restructure(|fit| fit.times.clone_from(times));
         fit.settle(ROUGH)?;
     }
-    // With a lag, or what it does would be taken for a history.
-    let lags = matches!(settings.dynamics, DynamicsKind::First | DynamicsKind::Auto) && !mode;
-    if lags {
-        fit = best_lag(&fit)?;
+    let refinement = Refinement { settings, shown: mode };
+    let mut starts = vec![None];
+    if fit.common.records.len() == 1 && fit.common.records[0].history.is_none() {
+        starts.extend([History::Virgin, History::Settled, History::Fitted].map(Some));
     }
-    choose_histories(&mut fit, settings)?;
-    if lags {
-        fit.set_poles(Form::None, &[]);
-        fit.settle(ROUGH)?;
+    let begun = with_each(&starts, |history| with_slow_and_late(&fit, settings, mode, *history))?;
+    let found = with_each(&distinct(begun), |start| {
+        let mut trial = start.clone();
+        refinement.refine(&mut trial, FIRST_ROUNDS)?;
+        Some(trial)
+    })?;
+    let better =
+        |a: Fit<'a>, b: Fit<'a>| if refinement.cost(&b) < refinement.cost(&a) { b } else { a };
+    let mut fit = found.into_iter().reduce(better)?;
+    choose_nodes(&mut fit, settings)?;
+    refinement.refine(&mut fit, ROUNDS)?;
+    drop_drifts(&mut fit)?;
+    replace_corners(&mut fit)?;
+    with_range_of_lags(fit, settings)
+}
+
+/// The fit with the smallest lag that explains the record as well, and the range of such lags.
+fn with_range_of_lags<'a>(mut fit: Fit<'a>, settings: &Settings) -> Option<Fit<'a>> {
+    fit.lags = None;
+    if settings.dynamics != DynamicsKind::Auto || matches!(fit.form, Form::Modes(_)) {
+        return Some(fit);
     }
-    choose_slow(&mut fit, settings)?;
-    choose_dynamics_and_creep(&mut fit, settings, mode)?;
+    let mut still = fit.clone();
+    still.set_poles(Form::None, &[]);
+    still.settle(ROUGH)?;
+    let lagging = best_lag(&still)?;
+    smallest_lag(still, &lagging)
+}
+
+/// Fits of different structures, the first of each.
+fn distinct(fits: Vec<Fit<'_>>) -> Vec<Fit<'_>> {
+    let mut kept: Vec<Fit<'_>> = Vec::new();
+    for fit in fits {
+        let same = |other: &Fit<'_>| {
+            let history =
+                |of: &Fit<'_>| of.begins.iter().map(|one| one.history).collect::<Vec<_>>();
+            let alike =
+                (&other.times, other.form, &other.drifts) == (&fit.times, fit.form, &fit.drifts);
+            alike
+                && history(other) == history(&fit)
+                && (other.rms / fit.rms - 1.0).abs() < SAME - 1.0
+        };
+        if !kept.iter().any(same) {
+            kept.push(fit);
+        }
+    }
+    kept
+}
+
+/// The structure from that of another model.
+fn resumed<'a>(mut fit: Fit<'a>, settings: &Settings, start: &Structure) -> Option<Fit<'a>> {
+    let (form, poles) = Form::of(&start.dynamics);
+    for (r, (history, drift)) in start.records.iter().enumerate().take(fit.begins.len()) {
+        let record = &fit.common.records[r];
+        let (history, from) = (record.history.unwrap_or(*history), record.drive.u[0]);
+        let chosen = record.drift == DriftKind::Auto;
+        fit.restructure(|fit| {
+            fit.begins[r] = Beginning { history, from };
+            fit.drifts[r] = if chosen { *drift } else { fit.drifts[r] };
+        });
+    }
+    fit.restructure(|fit| fit.times.clone_from(&start.creep_times));
+    for slot in fit.layout().creep_weights() {
+        fit.x[slot] = FIRST_SHARE;
+    }
+    fit.set_poles(form, &poles);
+    fit.settle(ROUGH)?;
+    for r in 0..fit.begins.len() {
+        if fit.begins[r].history == History::Fitted {
+            fit = fitted_history(&fit, r)?;
+        }
+    }
+    let refinement = Refinement { settings, shown: matches!(form, Form::Modes(_)) };
+    refinement.refine(&mut fit, ROUNDS)?;
     choose_nodes(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
+    Some(fit)
+}
+
+/// History, creep, drifts and dynamics, one after the other, from a fit with a history that is held,
+/// or is chosen among them.
+fn with_slow_and_late<'a>(
+    from: &Fit<'a>,
+    settings: &Settings,
+    mode: bool,
+    history: Option<History>,
+) -> Option<Fit<'a>> {
+    let mut fit = from.clone();
+    match history {
+        Some(History::Fitted) => fit = fitted_history(&fit, 0)?,
+        Some(history) => fit = with_history(&fit, 0, (history, 0.0), STEPS)?,
+        None => {
+            // With a lag, or what it does would be taken for a history.
+            let lags =
+                matches!(settings.dynamics, DynamicsKind::First | DynamicsKind::Auto) && !mode;
+            if lags {
+                fit = best_lag(&fit)?;
+            }
+            choose_histories(&mut fit, settings)?;
+            if lags {
+                fit.set_poles(Form::None, &[]);
+                fit.settle(ROUGH)?;
+            }
+        }
+    }
+    choose_slow(&mut fit, settings)?;
+    choose_dynamics_and_creep(&mut fit, settings, mode)?;
     Some(fit)
 }
 
@@ -178,7 +278,7 @@ fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
 }
 
 /// The fit with another history of record `r`, as good as it gets.
-fn with_history<'a>(
+pub(super) fn with_history<'a>(
     fit: &Fit<'a>,
     r: usize,
     (history, from): (History, f64),
@@ -200,13 +300,13 @@ fn with_history<'a>(
 }
 
 /// The voltage that the stage came from.
-fn fitted_history<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
+pub(super) fn fitted_history<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
     let drive = fit.common.records[r].drive;
     let (low, high) = range(drive.u);
     let (first, reach) = (drive.u[0], high - low);
     let parts = 16;
     let mut best = with_history(fit, r, (History::Fitted, first), STEPS)?;
-    let mut width = 2.0 * reach / index(parts);
+    let width = 2.0 * reach / index(parts);
     for i in 0..=parts {
         let from = first - reach + width * index(i);
         let trial = with_history(&best, r, (History::Fitted, from), FEW_STEPS)?;
@@ -214,6 +314,12 @@ fn fitted_history<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
             best = trial;
         }
     }
+    nearer(best, r, width)
+}
+
+/// The fit with the voltage that record `r` came from moved within `width`, V, to where it explains
+/// most.
+pub(super) fn nearer<'a>(mut best: Fit<'a>, r: usize, mut width: f64) -> Option<Fit<'a>> {
     for _ in 0..7 {
         width *= 0.5;
         let from = best.begins[r].from;

@@ -4,17 +4,13 @@ use super::lag::best_lag;
 use super::nodes::split;
 use super::trials::{side_by_side, with_each};
 use crate::identify::least_squares::settings::{
-    CreepKind, DynamicsKind, FIRST_SHARE, ROUGH, SAME, STEPS, Settings,
+    CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, ROUGH, SAME, STEPS, Settings,
 };
 use crate::identify::least_squares::solving::fit::{Fit, known_drift};
 use crate::identify::least_squares::solving::form::Form;
 use crate::identify::parameters::drift::{DRIFT_TIMES, DriftKind, repeats};
 use crate::math::{least, on_all_threads};
 use crate::signal::index;
-
-/// Shares of the deviation that each has to take away.
-const CREEP_GAIN: f64 = 0.015;
-const DRIFT_GAIN: f64 = 0.015;
 
 /// Least time constant of the creep, relative to that of the drive.
 const SLOWER: f64 = 0.5;
@@ -145,7 +141,7 @@ pub(super) fn drop_drifts(fit: &mut Fit<'_>) -> Option<()> {
 }
 
 /// The fit with the drift of record `r` that explains most.
-fn with_drift<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
+pub(super) fn with_drift<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
     let length = fit.common.records[r].length();
     let mut best: Option<Fit<'a>> = None;
     let tried = |time: f64| {

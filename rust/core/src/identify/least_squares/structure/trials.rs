@@ -8,7 +8,7 @@ pub(super) type Trial<'t, 'a> = &'t (dyn Fn() -> Option<Fit<'a>> + Sync);
 
 /// The fits of some trials, in their order.
 pub(super) fn side_by_side<'a, const N: usize>(trials: [Trial<'_, 'a>; N]) -> Option<[Fit<'a>; N]> {
-    found(&trials)?.try_into().ok()
+    settled_all(&trials)?.try_into().ok()
 }
 
 /// The fits of one trial with each of some values, in their order.
@@ -18,9 +18,10 @@ pub(super) fn with_each<'a, V: Sync>(
 ) -> Option<Vec<Fit<'a>>> {
     let ways: Vec<_> = values.iter().map(|value| || trial(value)).collect();
     let trials: Vec<Trial<'_, 'a>> = ways.iter().map(|way| way as Trial<'_, 'a>).collect();
-    found(&trials)
+    settled_all(&trials)
 }
 
-fn found<'a>(trials: &[Trial<'_, 'a>]) -> Option<Vec<Fit<'a>>> {
+/// The fits of trials that do not depend on each other, in their order.
+pub(super) fn settled_all<'a>(trials: &[Trial<'_, 'a>]) -> Option<Vec<Fit<'a>>> {
     on_all_threads(trials, &|trial| trial()).into_iter().collect()
 }

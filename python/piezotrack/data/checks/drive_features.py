@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._support.arrays import MOST_SAMPLES
-from .._support.statistics import sample_noise
-from .._support.units import drive_text
+from ..._support.arrays import MOST_SAMPLES
+from ..._support.statistics import sample_noise
+from ..._support.units import drive_text
 from .diagnostics import jumps, runs, turns
 
 if TYPE_CHECKING:

@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.arrays import check_dt, time_fault
-from .._support.display.table import Column as Cells
-from .._support.display.table import Table
-from .._support.messages import quoted
-from .._support.units import drive_text, drive_word, length_text, lookup
-from ..errors import DataError, ParameterError, PiezotrackError
+from ..._support.arrays import check_dt, time_fault
+from ..._support.display.table import Column as Cells
+from ..._support.display.table import Table
+from ..._support.messages import quoted
+from ..._support.units import drive_text, drive_word, length_text, lookup
+from ...errors import DataError, ParameterError, PiezotrackError
+from ..far_readings import are_few, bridged, far_notes, far_readings
+from ..formats import format_of
+from ..missing import checked_missing, complete
+from ..reader import USE_RESAMPLE, Log
+from .connections import unusual_connection
 from .drive_features import (
     DriveFeatures,
     TimeFeatures,
@@ -24,8 +29,6 @@ from .drive_features import (
     reversals_text,
     time_features,
 )
-from .formats import format_of
-from .reader import USE_RESAMPLE, Log
 
 if TYPE_CHECKING:
     import os
@@ -33,7 +36,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .columns import Column
+    from ..columns import Column
+    from ..missing import Missing
 
     Array = NDArray[np.float64]
 
@@ -221,6 +225,7 @@ def info(
     displacement: str | int | None = None,
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
+    missing: Missing = None,
 ) -> LogInfo:
     """Look into a log: columns, sampling, what the drive does, and what it can determine.
 
@@ -229,7 +234,7 @@ def info(
 
     Parameters
     ----------
-    path, time, drive, displacement, units, dt
+    path, time, drive, displacement, units, dt, missing
         As in `piezotrack.read`.
 
     Returns
@@ -267,6 +272,7 @@ def info(
             break
         except DataError as error:
             problems.append(_without_name(error, log.source.name))
+    log.takes(checked_missing(missing), roles)
     signals, fault = _signals(log, roles, dt)
     problems += fault
     t, u, y = (signals.get(role) for role in ("time", "drive", "displacement"))
@@ -279,6 +285,13 @@ def info(
                 t = check_dt(interval) * np.arange(count, dtype=np.float64)
             except ParameterError as error:
                 problems.append(str(error))
+    lost: list[str] = []
+    if u is not None and y is not None:
+        try:
+            u, y, _, lost = complete(u, y, missing, constant=False)
+        except DataError as error:
+            problems.append(str(error))
+            u = y = None
     times = time_features(t) if t is not None and t.size > 1 else None
     found, stroke = None, None if y is None else float(np.ptp(y))
     if t is not None and u is not None:
@@ -298,8 +311,17 @@ def info(
         drive=found,
         stroke=stroke,
         determines=tuple(sentences),
-        notes=tuple(log.columns.notes),
+        notes=(*log.columns.notes, *lost, *_of_signals(t, u, y)),
     )
+
+
+def _of_signals(t: Array | None, u: Array | None, y: Array | None) -> list[str]:
+    """Say which readings are far off, and whether the displacement follows the drive."""
+    if t is None or u is None or y is None or not t.size == u.size == y.size:
+        return []
+    far = far_readings(u, y)
+    connection = unusual_connection(u, bridged(y, far) if are_few(far) else y)
+    return [*far_notes(t, y, far), *([] if connection is None else [connection.note])]
 
 
 def _attempts(given: Mapping[str, str | int | None]) -> list[dict[str, str | int | None]]:

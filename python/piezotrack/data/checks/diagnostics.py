@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import _core
-from .._support.units import best_length_unit, drive_text, length_text
-from ..errors import DataError
+from ... import _core
+from ..._support.units import best_length_unit, drive_text, length_text
+from ...errors import DataError
+from .connections import unusual_connection
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from numpy.typing import NDArray
 
-    from .dataset import Dataset
+    from ..dataset import Dataset
 
     Array = NDArray[np.float64]
 
@@ -99,7 +100,14 @@ would be 40 um if it is 1e6 too large, as um taken as m
     """
     if np.ptp(data.u) == 0.0 or np.ptp(data.y) == 0.0:
         return [*data.notes]
-    return [*data.notes, *_units(data), *_seldom(data), *_periods(data), *_clipping(data)]
+    notes = [*data.notes, *data.far_notes]
+    whole = data.without_far_readings()
+    connection = unusual_connection(whole.u, whole.y)
+    if connection is not None:
+        notes.append(connection.note)
+        if not connection.follows:
+            return notes
+    return [*notes, *_units(whole), *_seldom(data), *_periods(whole), *_clipping(whole)]
 
 
 def fit_warnings(

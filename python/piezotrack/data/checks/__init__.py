@@ -1,0 +1,1 @@
+"""Checks of a record: wrong connections, readings far off, hum, and what it cannot show."""

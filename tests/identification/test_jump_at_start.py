@@ -1,0 +1,102 @@
+"""Records whose drive jumps to the first sample, and starts of other records."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from piezotrack.data.dataset import Hold
+
+DT, NOISE = 1e-3, 20e-9
+STAGE = pt.PrandtlIshlinskiiStage(
+    linear=8e-7,
+    thresholds=(5.0, 10.0, 20.0, 30.0),
+    weights=(1e-7, 8e-8, 6e-8, 4e-8),
+    frequency=120.0,
+    damping_ratio=0.05,
+)
+T = DT * np.arange(4000)
+
+
+def jumping(hold: Hold = "foh") -> pt.Dataset:
+    """A triangle from 20 V, to which the stage came from rest at 0 V within one interval."""
+    u = 20.0 + 110.0 * np.abs((T + 0.5) % 1.0 - 0.5)
+    x = STAGE.simulate(np.concatenate(([0.0], u)), DT, hold=hold).x[1:]
+    return pt.Dataset(
+        u=u, y=x + NOISE * np.random.default_rng(0).normal(size=u.size), dt=DT, hold=hold
+    )
+
+
+def other_motion() -> pt.Dataset:
+    u = 37.5 * (1.0 - np.cos(6.0 * np.pi * T))
+    return pt.Dataset(u=u, y=STAGE.simulate(u, DT).x, dt=DT)
+
+
+@pytest.mark.parametrize("hold", ["foh", "zoh"])
+def test_a_stage_at_rest_before_the_drive_jumped_is_known(hold: Hold, tmp_path: Path) -> None:
+    log = jumping(hold)
+    fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+    assert fit.start is not None
+    assert fit.start.history == "rest"
+    assert fit.cost < 1.2 * NOISE
+    assert fit.score(other_motion(), history="virgin").rms < 3.0 * NOISE
+    # The jump lies at the first sample, which is not judged.
+    assert len(fit.data) == len(log) - 1
+    fit.save(tmp_path / "model.json")
+    again = pt.load(tmp_path / "model.json")
+    assert again.score(fit.data).rms == pytest.approx(fit.cost, rel=1e-6)
+    named = pt.identify(log, "prandtl-ishlinskii", history="rest", progress=False)
+    assert named.cost == pytest.approx(fit.cost, rel=1e-6)
+
+
+def test_a_searched_model_begins_at_rest_too() -> None:
+    stage = pt.FirstOrderDahlStage(
+        mass=0.1828,
+        damping=100.0,
+        stiffness=26065.0,
+        piezo_coefficient=0.0468,
+        rest_stiffness=9e3,
+        coulomb_force=0.15,
+    )
+    u = 30.0 + 25.0 * np.sin(2.0 * np.pi * T)
+    x = stage.simulate(np.concatenate(([0.0], u)), DT).x[1:]
+    log = pt.Dataset(u=u, y=x, dt=DT)
+    fit = pt.identify(log, "first-order-dahl", progress=False)
+    assert fit.start is not None
+    assert fit.start.history == "rest"
+    virgin = pt.identify(log, "first-order-dahl", history="virgin", progress=False)
+    assert fit.cost < 0.5 * virgin.cost
+
+
+def test_a_jump_is_of_one_record() -> None:
+    with pytest.raises(pt.ParameterError) as error:
+        pt.identify([jumping(), other_motion()], "prandtl-ishlinskii", history="rest")
+    assert error.value.argument == "history"
+
+
+def test_a_record_that_neither_simple_history_explains_begins_with_a_fitted_one() -> None:
+    stage = pt.PrandtlIshlinskiiStage(
+        linear=8e-7, thresholds=(2.0, 5.0, 10.0, 20.0), weights=(1e-7, 1e-7, 8e-8, 6e-8)
+    )
+    rng, t = np.random.default_rng(3), 2e-3 * np.arange(3000)
+
+    def record(u: NDArray[np.float64], before: list[float]) -> pt.Dataset:
+        x = stage.simulate(u, 2e-3, initial=stage.equilibrium([*before, float(u[0])])).x
+        return pt.Dataset(u=u, y=x + 1e-8 * rng.normal(size=u.size), dt=2e-3)
+
+    large = record(37.5 * (1.0 - np.cos(2.0 * np.pi * t) * (1.0 - t / 8.0)), [])
+    fit = pt.identify(large, "prandtl-ishlinskii", progress=False)
+    # A virgin and a settled stage move alike in this small loop, and both differ from one that
+    # came from 75 V, far beyond the drive of the record.
+    small = record(40.0 + 6.0 * np.sin(2.0 * np.pi * t + 1.2), [75.0])
+    assert fit.score(small, history="virgin").rms > 20.0 * fit.cost
+    assert fit.score(small).rms < 3.0 * fit.cost
