@@ -160,4 +160,5 @@ def test_each_part_of_the_model_earns_its_place() -> None:
     # the cost the least is taken.
     assert crept.cost < 1.035 * bent.cost
     assert bent.cost < late.cost < 1.005 * alone.cost
-    assert alone.score(tracking).rms > late.score(tracking).rms > bent.score(tracking).rms
+    # At one rate, creep that is faster than the drive stands for a lag.
+    assert alone.score(tracking).rms >= late.score(tracking).rms > bent.score(tracking).rms
