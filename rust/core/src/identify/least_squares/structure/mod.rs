@@ -1,5 +1,6 @@
 //! The structure of a fit: nodes, modes, lag, creep and drifts, each chosen from trials.
 
+mod histories;
 mod lag;
 mod modes;
 mod nodes;

@@ -7,8 +7,8 @@
 //! take away: residuals of models are correlated, so that criteria that count independent samples,
 //! as Akaike's, would take every part.
 
+use super::histories::{fitted_history, nearer, with_history};
 use super::lag::best_lag;
-use super::selection::{fitted_history, nearer, with_history};
 use super::slow_parts::{creeps, with_drift};
 use super::trials::{Trial, settled_all, with_each};
 use crate::identify::least_squares::settings::{
@@ -128,27 +128,25 @@ impl Refinement<'_> {
         Some(found)
     }
 
+    /// The other histories of each record, or another voltage that it came from.
     fn histories(&self, fit: &mut Fit<'_>) -> Option<()> {
         for r in 0..fit.common.records.len() {
             if fit.common.records[r].history.is_some() {
                 continue;
             }
-            let from = fit.clone();
+            let from = &fit.clone();
             let mut ways: Vec<Way<'_, '_>> = Vec::new();
             for history in [History::Virgin, History::Settled] {
                 if from.begins[r].history != history {
-                    let from = &from;
                     ways.push(Box::new(move || with_history(from, r, (history, 0.0), FEW_STEPS)));
                 }
             }
-            if from.begins[r].history != History::Fitted {
-                let from = &from;
-                ways.push(Box::new(move || fitted_history(from, r)));
-            } else {
-                let from = &from;
+            if from.begins[r].history == History::Fitted {
                 let (low, high) = range(from.common.records[r].drive.u);
                 let width = 0.125 * (high - low);
                 ways.push(Box::new(move || nearer(from.clone(), r, width)));
+            } else {
+                ways.push(Box::new(move || fitted_history(from, r)));
             }
             self.take(fit, &ways)?;
         }
@@ -157,20 +155,42 @@ impl Refinement<'_> {
 
     /// Creep, drifts, and a lag, which stand for each other.
     fn slow_and_late(&self, fit: &mut Fit<'_>) -> Option<()> {
-        let from = fit.clone();
-        let from = &from;
-        let mut ways: Vec<Way<'_, '_>> = Vec::new();
-        let free = self.settings.creep == CreepKind::Auto;
+        let from = &fit.clone();
+        let mut ways = self.other_creeps(from);
+        for (r, record) in from.common.records.iter().enumerate() {
+            if record.drift != DriftKind::Auto || !repeats(&record.drive.u[record.start..]) {
+                continue;
+            }
+            if from.drifts[r].is_some() {
+                ways.push(Box::new(move || {
+                    let mut bare = without_drift(from, r);
+                    bare.settle(ROUGH)?;
+                    Some(bare)
+                }));
+                continue;
+            }
+            ways.push(Box::new(move || with_drift(from, r)));
+            if self.settings.creep == CreepKind::Auto && !from.times.is_empty() {
+                ways.push(Box::new(move || with_drift(&with_creep(from, &[])?, r)));
+            }
+        }
+        self.take(fit, &ways)?;
+        Some(())
+    }
+
+    /// Other creep, also in place of a lag or of a drift, or with a lag.
+    fn other_creeps<'t, 'a>(&self, from: &'t Fit<'a>) -> Vec<Way<'t, 'a>> {
+        let mut ways: Vec<Way<'t, 'a>> = Vec::new();
+        if self.settings.creep != CreepKind::Auto {
+            return ways;
+        }
         let lags =
             self.settings.dynamics == DynamicsKind::Auto && !matches!(from.form, Form::Modes(_));
-        let mut creep = if free { creeps(from) } else { Vec::new() };
-        if free {
-            creep.push(decades(from));
-            creep.push(Vec::new());
-        }
+        let mut creep = creeps(from);
+        creep.extend([decades(from), Vec::new()]);
         creep.retain(|times| *times != from.times);
         for times in creep {
-            let none = times.is_empty();
+            let (none, many) = (times.is_empty(), times.len() > 2);
             let other = times.clone();
             ways.push(Box::new(move || with_creep(from, &other)));
             if lags && !none && from.form == Form::First {
@@ -181,41 +201,18 @@ impl Refinement<'_> {
                     with_creep(&bare, &other)
                 }));
             }
-            if lags && from.form == Form::None && (none || times.len() > 2) {
+            if lags && from.form == Form::None && (none || many) {
                 let other = times.clone();
                 ways.push(Box::new(move || best_lag(&with_creep(from, &other)?)));
             }
             for r in 0..from.common.records.len() {
                 if from.common.records[r].drift == DriftKind::Auto && from.drifts[r].is_some() {
                     let other = times.clone();
-                    ways.push(Box::new(move || {
-                        let mut bare = from.clone();
-                        bare.restructure(|bare| bare.drifts[r] = None);
-                        with_creep(&bare, &other)
-                    }));
+                    ways.push(Box::new(move || with_creep(&without_drift(from, r), &other)));
                 }
             }
         }
-        for (r, record) in from.common.records.iter().enumerate() {
-            if record.drift != DriftKind::Auto || !repeats(&record.drive.u[record.start..]) {
-                continue;
-            }
-            if from.drifts[r].is_some() {
-                ways.push(Box::new(move || {
-                    let mut bare = from.clone();
-                    bare.restructure(|bare| bare.drifts[r] = None);
-                    bare.settle(ROUGH)?;
-                    Some(bare)
-                }));
-            } else {
-                ways.push(Box::new(move || with_drift(from, r)));
-                if free && !from.times.is_empty() {
-                    ways.push(Box::new(move || with_drift(&with_creep(from, &[])?, r)));
-                }
-            }
-        }
-        self.take(fit, &ways)?;
-        Some(())
+        ways
     }
 
     /// Time constants of the creep, moved one at a time and both.
@@ -225,8 +222,7 @@ impl Refinement<'_> {
         }
         for ratio in RATIOS {
             for _ in 0..3 {
-                let from = fit.clone();
-                let from = &from;
+                let from = &fit.clone();
                 let mut ways: Vec<Way<'_, '_>> = Vec::new();
                 let count = from.times.len();
                 for part in 0..=count {
@@ -285,6 +281,13 @@ impl Refinement<'_> {
         self.take(fit, &ways)?;
         Some(())
     }
+}
+
+/// The fit without the drift of record `r`.
+fn without_drift<'a>(from: &Fit<'a>, r: usize) -> Fit<'a> {
+    let mut bare = from.clone();
+    bare.restructure(|bare| bare.drifts[r] = None);
+    bare
 }
 
 /// Time constants of one relaxation a decade, s.

@@ -2,6 +2,7 @@
 //!
 //! Each is decided in turn on the least squares so far, and has to earn its place.
 
+use super::histories::{fitted_history, with_history};
 use super::lag::{best_lag, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::nodes::{add_once, choose_nodes, few_or_many, spread};
@@ -19,7 +20,7 @@ use crate::identify::least_squares::weights_record::WeightsRecord;
 use crate::identify::parameters::drift::DriftKind;
 use crate::identify::records::history::History;
 use crate::math::least;
-use crate::signal::{index, range};
+use crate::signal::index;
 
 /// Rounds over the numbers of an envelope, at most.
 const SHAPE_ROUNDS: usize = 20;
@@ -40,9 +41,6 @@ const ROWS: usize = 4000;
 /// Longest interval of a thinned record, as a phase of the drive, rad: its peaks are then known to
 /// a thousandth of the travel.
 const LONGEST_PHASE: f64 = 0.06;
-
-/// Steps of a trial among many: the best one is settled.
-const FEW_STEPS: usize = 2;
 
 /// The best stage; `None` where stopped.
 pub(in crate::identify::least_squares) fn search<'a>(
@@ -275,63 +273,6 @@ fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
         }
     }
     Some(())
-}
-
-/// The fit with another history of record `r`, as good as it gets.
-pub(super) fn with_history<'a>(
-    fit: &Fit<'a>,
-    r: usize,
-    (history, from): (History, f64),
-    steps: usize,
-) -> Option<Fit<'a>> {
-    let mut trial = fit.clone();
-    trial.restructure(|trial| trial.begins[r] = Beginning { history, from });
-    if history == History::Fitted {
-        for share in trial.layout().creep_weights() {
-            trial.x[share] = trial.x[share].max(FIRST_SHARE);
-        }
-    }
-    if steps == STEPS {
-        trial.settle(ROUGH)?;
-    } else {
-        trial.settle_rigid(steps)?;
-    }
-    Some(trial)
-}
-
-/// The voltage that the stage came from.
-pub(super) fn fitted_history<'a>(fit: &Fit<'a>, r: usize) -> Option<Fit<'a>> {
-    let drive = fit.common.records[r].drive;
-    let (low, high) = range(drive.u);
-    let (first, reach) = (drive.u[0], high - low);
-    let parts = 16;
-    let mut best = with_history(fit, r, (History::Fitted, first), STEPS)?;
-    let width = 2.0 * reach / index(parts);
-    for i in 0..=parts {
-        let from = first - reach + width * index(i);
-        let trial = with_history(&best, r, (History::Fitted, from), FEW_STEPS)?;
-        if trial.rms < best.rms {
-            best = trial;
-        }
-    }
-    nearer(best, r, width)
-}
-
-/// The fit with the voltage that record `r` came from moved within `width`, V, to where it explains
-/// most.
-pub(super) fn nearer<'a>(mut best: Fit<'a>, r: usize, mut width: f64) -> Option<Fit<'a>> {
-    for _ in 0..7 {
-        width *= 0.5;
-        let from = best.begins[r].from;
-        for from in [from - width, from + width] {
-            let trial = with_history(&best, r, (History::Fitted, from), FEW_STEPS)?;
-            if trial.rms < best.rms {
-                best = trial;
-            }
-        }
-    }
-    best.settle(ROUGH)?;
-    Some(best)
 }
 
 /// The histories that were set, or the simplest ones that explain the records.
