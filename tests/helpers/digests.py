@@ -43,7 +43,8 @@ def digests(threads: int) -> list[str]:
 
 
 def digest(fit: Any) -> str:
-    content = repr((fit.document(), fit.search.history.tobytes()))
+    course = fit.search.history.tobytes() if fit.search else b""
+    content = repr((fit.document(), course))
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
