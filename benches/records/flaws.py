@@ -88,9 +88,9 @@ KINDS: dict[str, Callable[[np.random.Generator, Array, Array, float], Reading]] 
 }
 
 # What a sentence has to say to name a flaw. A stage of a kind that the package does not have is
-# named by a sentence that no kind describes it, where the record has no flaw.
+# named by a sentence that no model describes it, where the record has no flaw.
 NAMED = {
-    "none": r"no kind|cannot describe|does not fit",
+    "none": r"no kind|no model|cannot describe|does not fit",
     "delay": r"delay|\blate\b|\blag\b(?! from 0 )",
     "drift": r"drift",
     "hum": r"\bhum\b|mains|[56]0(\.\d+)? Hz",
@@ -103,7 +103,7 @@ NAMED = {
 
 # A sentence that says, of whatever cause, that the model may not hold.
 DOUBT = (
-    r"no kind|cannot describe|does not|times the noise|fits as well|at this rate only|"
+    r"no kind|no model|cannot describe|does not|times the noise|fits as well|at this rate only|"
     r"not determine|more than a sensor|of the squared residual|not fitted|shorter than a period|"
     r"goes from .* that of the record|ill-conditioned"
 )

@@ -65,6 +65,8 @@ def judge(case: Case) -> dict[str, Any]:
             *notes,
             *data.notes,
             *fit.notes,
+            # How the record begins, and a drift or a delay that was fitted.
+            *(line.strip() for line in fit.summary().splitlines()[2:4]),
             *(f"other motion: {note}" for note in score.notes),
         ],
     }
