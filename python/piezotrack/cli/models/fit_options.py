@@ -66,7 +66,7 @@ KindsNamed = Annotated[
         "--model",
         metavar="MODEL",
         autocompletion=lambda: list(LISTED),
-        help=f"Kind of model: {', '.join(LISTED)}; default auto, the best of them. Repeatable.",
+        help=f"Model: {', '.join(LISTED)}; default auto, the best of them. Repeatable.",
     ),
 ]
 Free = Annotated[
@@ -156,7 +156,7 @@ Drifts = Annotated[
 History = Annotated[
     str | None,
     typer.Option(
-        metavar="virgin|settled|fit",
+        metavar="virgin|settled|fit|rest",
         help="What the stage went through before the log; default what the log shows.",
     ),
 ]
@@ -164,7 +164,7 @@ Histories = Annotated[
     list[str] | None,
     typer.Option(
         "--history",
-        metavar="virgin|settled|fit",
+        metavar="virgin|settled|fit|rest",
         help="What the stage went through before the log; default what the log shows. Once, or "
         "once for each of several logs.",
     ),
