@@ -140,9 +140,10 @@ def case(i: int, stage_of: Callable[..., pt.stages.Stage], *, quick: bool) -> Ca
 
 
 def natural_frequency(model: pt.stages.Stage) -> float | None:
-    if isinstance(model, pt.PrandtlIshlinskiiStage):
-        return model.frequency
-    assert isinstance(model, (pt.FirstOrderDahlStage, pt.BoucWenStage, pt.ParallelDahlStage))
+    if not isinstance(model, (pt.FirstOrderDahlStage, pt.BoucWenStage, pt.ParallelDahlStage)):
+        # Hysteresis at the input, dynamics behind it.
+        frequency: float | None = getattr(model, "frequency")  # noqa: B009
+        return frequency
     return float(np.sqrt(model.stiffness / model.mass) / (2.0 * np.pi))
 
 

@@ -17,17 +17,17 @@ HEADLINE = {
     "dahl": (0.49, 0.81, 1.24),
     "bouc-wen": (0.71, 0.82, 1.19),
     "asymmetric-bouc-wen": (0.41, 0.55, 1.30),
-    "prandtl-ishlinskii": (0.27, 0.28, 0.38),
+    "prandtl-ishlinskii": (0.27, 0.29, 0.35),
     "first-order-dahl": (0.72, 0.83, 0.745),
     "parallel-dahl": (0.70, 0.74, 0.73),
     "lugre": (0.72, 0.83, 0.745),
-    "maxwell-slip": (0.69, 0.70, 0.62),
+    "maxwell-slip": (0.69, 0.72, 0.59),
     "generalised-prandtl-ishlinskii": (0.27, 0.28, 0.50),
-    "rate-dependent-prandtl-ishlinskii": (0.27, 0.28, 0.38),
+    "rate-dependent-prandtl-ishlinskii": (0.27, 0.29, 0.35),
     "polynomial-prandtl-ishlinskii": (0.33, 0.34, 0.83),
     "asymmetric-prandtl-ishlinskii": (0.17, 0.19, 0.34),
-    "preisach": (0.16, 0.20, 0.54),
-    "duhem": (0.19, 0.22, 0.93),
+    "preisach": (0.18, 0.20, 0.57),
+    "duhem": (0.19, 0.21, 0.88),
 }
 
 
