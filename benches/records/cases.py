@@ -20,7 +20,7 @@ RATES = (500.0, 1000.0, 2000.0, 5000.0)  # Hz
 
 @dataclass(frozen=True)
 class Kinds:
-    """What a case is made of."""
+    """Sorts of stage, record and flaw of a case."""
 
     stage: str
     record: str

@@ -1,6 +1,6 @@
 //! Refinement of a structure: other histories, creep, drifts and dynamics beside those chosen.
 //!
-//! What is chosen in turn depends on the order: a lag may stand for creep, a history for a drift.
+//! Choices in turn depend on their order: a lag may stand for creep, a history for a drift.
 //! From the structure so far, neighbours in one part, or in two that stand for each other, are
 //! settled side by side, and the one of least cost is taken, until none is better. The cost is the
 //! logarithm of the RMS deviation and, for each part, the share of the deviation that it has to
