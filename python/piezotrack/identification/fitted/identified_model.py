@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from ..._support.display.result import Result
 from ..._support.files.writing import write_document
 from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
+from ...stages.slow_loop import SlowLoop
 from .delayed_reading import delayed_reading
 from .drift import drift_entry
 from .fitted_record import record_entries, record_of
@@ -126,6 +128,12 @@ class IdentifiedModel(Result):
         """Sampling interval of the record identified [s]; None if the file has none."""
         found = self._record.get("dt_s")
         return None if found is None else float(found)
+
+    @cached_property
+    def slow_loop(self) -> SlowLoop | None:
+        """Slow loop over the range of the drive identified; None if the file has no range."""
+        reached = self.drive_range
+        return None if reached is None else SlowLoop.of(self.model, *reached)
 
     @property
     def _record(self) -> Mapping[str, Any]:
