@@ -135,6 +135,8 @@ def identify_command(
     quiet: Quiet = False,
 ) -> None:
     """Identify models of a stage from one log or several."""
+    from ...identification.fitted.score import share_fitted
+
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
@@ -197,9 +199,10 @@ def identify_command(
         (out / _partial(kind)).unlink(missing_ok=True)
         words.append(fit.summary())
         if second is not None and score is not None:
-            own = ", with an offset of its own" if offset else ""
+            own = ", with an offset of its own" if offset and score.fitted_share < 1.0 else ""
             span = f"from {second.t[0]:.6g} to {second.t[-1]:.6g} s"
-            words.append(f"on {second.source} {span}, not fitted{own}: {score}")
+            fitted = share_fitted(score.fitted_share)
+            words.append(f"on {second.source} {span}, {fitted}{own}: {score}")
             words += [f"note  {note}" for note in score.notes]
         documents.append({**fit.document(), "notes": fit.notes})
     result.show("\n\n".join(words), {"models": documents}, written)
@@ -253,6 +256,8 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
         "window_s": [float(second.t[0]), float(second.t[-1])],
         "rms": {"value": score.rms, "unit": "m"},
         "max_error": {"value": score.max_error, "unit": "m"},
+        "max_error_time": {"value": score.max_error_time, "unit": "s"},
+        "fitted_share": score.fitted_share,
         "fit_percent": {"value": score.fit_percent, "unit": "%"},
         "offset": {"value": score.offset, "unit": "m"},
     }

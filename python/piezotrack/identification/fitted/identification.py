@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -156,6 +156,34 @@ class Identification(IdentifiedModel):
     def _responses(self) -> list[Response]:
         """Motion of the model on each record."""
         return [self.simulate(data, offset=one.offset) for data, one in self._fitted]
+
+    @cached_property
+    def noises(self) -> tuple[float, ...]:
+        """Noise of each record from sample to sample [m], as far as the model does not explain it.
+
+        0 for a record of fewer than 16 samples.
+        """
+        return tuple(
+            min(sample_noise(data.y), sample_noise(data.y - run.x))
+            for (data, _), run in zip(self._fitted, self._responses, strict=True)
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        document = super().document()
+        if len(self.records) == 1:
+            document["fit"] = document.get("fit", {}) | {
+                "max_error": {"value": self.fitted.max_error, "unit": "m"},
+                "max_error_time": {"value": self.fitted.max_error_time, "unit": "s"},
+                "noise": {"value": self.noises[0], "unit": "m"},
+            }
+        return document
 
     @property
     def notes(self) -> list[str]:
