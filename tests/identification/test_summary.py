@@ -54,10 +54,10 @@ def number(text: str, unit: str) -> float:
 def test_the_block_has_what_the_stage_is() -> None:
     text, loop = fitted().summary(), fitted().slow_loop
     assert loop is not None
-    assert number(row(text, "gain"), "um/V") == pytest.approx(1e6 * loop.gain, rel=1e-3)
+    assert number(row(text, "gain"), "um/V") == pytest.approx(1e6 * loop.gain, rel=5e-3)
     wide = row(text, "hysteresis")
     assert number(wide, "%") == pytest.approx(loop.width_percent, rel=5e-3)
-    assert number(wide, "um") == pytest.approx(1e6 * loop.width, rel=1e-3)
+    assert number(wide, "um") == pytest.approx(1e6 * loop.width, rel=5e-3)
     assert loop.width_percent == pytest.approx(15.0, abs=6.0)
     assert number(row(text, "creep"), "%") == pytest.approx(3.0, abs=1.0)
     assert number(row(text, "creep"), "s") == 0.5
@@ -67,7 +67,7 @@ def test_the_block_has_what_the_stage_is() -> None:
 
 def test_errors_stand_beside_the_noise() -> None:
     errors = row(fitted().summary(), "rms error")
-    assert number(errors, "nm") == pytest.approx(1e9 * fitted().cost, rel=1e-3)
+    assert number(errors, "nm") == pytest.approx(1e9 * fitted().cost, rel=5e-3)
     most = errors.partition("largest ")[2]
     scale = {"nm": 1e-9, "um": 1e-6}[most.split()[1]]
     assert scale * float(most.split()[0]) == pytest.approx(FAR, rel=0.2)

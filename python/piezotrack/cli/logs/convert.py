@@ -45,7 +45,7 @@ def convert_command(
     to the last bit.
     """
     from ...data.log_file import format_to_write
-    from ..advice import as_options
+    from ..output import print_words
 
     format_to_write(out)
     if out.exists() and not overwrite:
@@ -57,5 +57,5 @@ def convert_command(
     if not quiet:
         print(f"{len(log)} samples, {log.duration:.6g} s at {1.0 / log.dt:.6g} Hz")
         for note in log.notes:
-            print(as_options(f"note  {note}"))
+            print_words(f"note  {note}")
         list_files([written])

@@ -44,7 +44,7 @@ def rows(quantities: Iterable[Row], indent: int = 2) -> list[str]:
     list of str
         One line each.
     """
-    return [f"{'':<{indent}}{name:<11} {value}" for name, value in quantities]
+    return [f"{'':<{indent}}{name:<10} {value}" for name, value in quantities]
 
 
 def of_stage(model: IdentifiedModel) -> list[Row]:
@@ -111,7 +111,7 @@ def errors_of(fit: Identification, i: int) -> list[Row]:
     Returns
     -------
     list of (str, str)
-        One row.
+        One row, and one of the share of the motion where there is one record.
     """
     record, score = fit.records[i], fit.scores[i]
     several = len(fit.records) > 1
@@ -135,7 +135,7 @@ def errors_of_file(model: IdentifiedModel) -> list[Row]:
     Returns
     -------
     list of (str, str)
-        One row, or none where the file has no rms error.
+        As of a fit, or none where the file has no rms error.
     """
     entries = model.details.get("fit")
 
@@ -164,7 +164,7 @@ def _loop(model: IdentifiedModel) -> list[Row]:
     found = [("gain", f"{scale * loop.gain:.4g} {unit}")]
     if loop.width > CLOSED * abs(loop.travel):
         share = f"{loop.width_percent:.3g} % of the travel"
-        found.append(("hysteresis", f"{share}, {length_text(loop.width)}"))
+        found.append(("hysteresis", f"{share}, {length_text(loop.width, 3)}"))
     return found
 
 
@@ -199,9 +199,10 @@ def _errors(
 ) -> list[Row]:
     """Rms and largest error side by side with the noise."""
     most, when = largest
-    text = f"{length_text(rms)} ({100.0 * rms / stroke:.3g} % of stroke)"
+    text = f"{length_text(rms, 3)} ({100.0 * rms / stroke:.3g} % of stroke)"
     if not math.isnan(most):
-        text += f", largest {length_text(most)} at {when:.6g} s"
+        text += f", largest {length_text(most, 3)} at {when:.6g} s"
     if noise > 0.0:
-        text += f", noise {length_text(noise)}"
-    return [("rms error", text if math.isnan(fit) else f"{text}; fit {fit:.4g} %")]
+        text += f", noise {length_text(noise, 3)}"
+    found = [("rms error", text)]
+    return found if math.isnan(fit) else [*found, ("fit", f"{fit:.4g} % of the motion")]

@@ -90,9 +90,9 @@ def model_text(model: IdentifiedModel) -> str:
 def _of_one(fit: Identification) -> list[str]:
     """Say from which record, and what is left of it."""
     data, record = fit.data, fit.records[0]
-    of_record = [*of_sensor(record, data), *errors_of(fit, 0)]
+    of_record = [*of_sensor(record, data), *errors_of(fit, 0), ("record", _size(data))]
     return [
-        f"{fit.model.info.title}: stage identified from {data.source or 'a record'}, {_size(data)}",
+        f"{fit.model.info.title}: stage identified from {data.source or 'a record'}",
         *rows([*of_stage(fit), *of_record]),
     ]
 
@@ -100,7 +100,7 @@ def _of_one(fit: Identification) -> list[str]:
 def _of_several(fit: Identification) -> list[str]:
     """Say from which records, what is left of each, and what each has of its own."""
     rms = (
-        f"{length_text(fit.cost)} of all ({fit.cost_percent:.3g} % of the largest stroke), "
+        f"{length_text(fit.cost, 3)} of all ({fit.cost_percent:.3g} % of the largest stroke), "
         f"fit {fit.fit_percent:.4g} %"
     )
     lines = [
