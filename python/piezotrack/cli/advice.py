@@ -43,6 +43,7 @@ REMEDIES = [
     (r"\bcreep=False", "--creep none", "--creep"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
     # An option of the commands that come after `info`.
+    (r"\bfit\.zeroed\(\)", "--zero", "--zero"),
     (r"\blog\.decimate\((\w+)\)", r"--decimate \1", "--displacement"),
 ]
 # Where a command has no options for columns, the header of the file has to say it.
@@ -97,6 +98,8 @@ def as_options(said: object) -> str:
         text = re.sub(r"; resample= puts it [^;]*", "", text)
     if "--missing" not in known:
         text = re.sub(r"; missing='drop' leaves .*", "", text)
+    if "--zero" not in known:
+        text = re.sub(r"; fit\.zeroed\(\) .*", "", text)
     text = text.replace(", or largest_saturation=0.5 or more", "")
     for python, words, needed in REMEDIES:
         if needed in known:

@@ -41,6 +41,7 @@ __all__ = [
     "Seconds",
     "TimeColumn",
     "Units",
+    "Zero",
     "can_be_folder",
     "can_be_written",
     "column",
@@ -117,6 +118,14 @@ Period = Annotated[
     float | None,
     typer.Option(help="Time in s after which a reference from a file repeats; default never."),
 ]
+Zero = Annotated[
+    bool,
+    typer.Option(
+        "--zero",
+        help="Displacements from the beginning of the record on: less what its sensor reads there, "
+        "before the drive moves. Default as recorded.",
+    ),
+]
 Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that exist.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the figures as one JSON document.")]
@@ -144,10 +153,11 @@ class Columns:
         unit: list[str] | None,
         dt: float | None,
         decimate: int | None = None,
+        zero: bool = False,
     ) -> None:
         self.time, self.drive, self.displacement = map(column, (time, drive, displacement))
         self.units = {column(name) or name: text for name, text in pairs("--unit", unit)}
-        self.dt, self.decimate = dt, decimate
+        self.dt, self.decimate, self.zero = dt, decimate, zero
 
     def read(
         self,
@@ -170,10 +180,10 @@ class Columns:
             hold=hold,
             missing=missing,
         )
-        if self.decimate in (None, 1):
-            return log
-        with of_file(file):
-            return log.decimate(self.decimate)
+        if self.decimate not in (None, 1):
+            with of_file(file):
+                log = log.decimate(self.decimate)
+        return log.zeroed() if self.zero else log
 
     def read_drive(self, file: Path) -> Dataset:
         """Read a drive with these columns."""

@@ -41,6 +41,9 @@ __all__ = ["Dataset", "Hold"]
 
 Hold = Literal["foh", "zoh"]
 
+# Share of its range by which a drive has left its first sample.
+STANDS = 2e-3
+
 
 class Dataset(Viewed):
     """An evenly sampled record of one axis, in seconds, volts and metres.
@@ -151,7 +154,7 @@ class Dataset(Viewed):
         self._columns, self._column_units = further_columns(columns, column_units, self._u)
         self._hold, self._drive_unit, self._source = hold, drive_unit, source
         self._notes = (*map(str, notes), *filled.notes)
-        self._start = 0
+        self._start, self._zero = 0, 0.0
         self._sha256: str | None = None
         self._far: Mask | None = None
 
@@ -315,9 +318,14 @@ class Dataset(Viewed):
     @property
     def far(self) -> Mask:
         """Samples in the window that are single readings far off, shape (n,)."""
+        return self._far_of_all[self._start :]
+
+    @property
+    def _far_of_all(self) -> Mask:
+        """Single readings far off, those of the warm-up too."""
         if self._far is None:
             self._far = far_readings(self._u, self._y)
-        return self._far[self._start :]
+        return self._far
 
     @property
     def far_notes(self) -> list[str]:
@@ -364,7 +372,7 @@ class Dataset(Viewed):
             return self
         part = self._part(0, self._u.size, start=self._start)
         # Those of the warm-up, which does not count, have no effect.
-        apart = far_readings(self._u, self._y) if self._far is None else self._far
+        apart = self._far_of_all
         mask = apart if self._left_out is None else self._left_out | apart
         part._recorded = self._y if self._recorded is None else self._recorded
         part._y, part._left_out = signal_of("y", bridged(self._y, mask)), mask
@@ -414,6 +422,11 @@ class Dataset(Viewed):
     def full(self) -> Dataset:
         """The window together with its warm-up, all of them as ordinary samples."""
         return self._part(0, self._u.size, start=0)
+
+    @property
+    def zero(self) -> float:
+        """Displacement of the source that `zeroed` subtracted [m]; 0 where nothing was."""
+        return self._zero
 
     @property
     def duration(self) -> float:
@@ -563,9 +576,43 @@ class Dataset(Viewed):
             fine._left_out = np.repeat(self._left_out, factor)[: fine._u.size]
         return fine._part(0, len(fine), start=self._start * factor)
 
+    def zeroed(self) -> Dataset:
+        """Return the record with displacements that count from its beginning.
+
+        What is subtracted is the median of the readings, warm-up included, up to where the drive
+        first leaves its first sample by 0.2 % of its range; the first reading where it moves at
+        once. Readings that do not count are left aside.
+
+        Returns
+        -------
+        Dataset
+            The record, whose `zero` is what was subtracted. A window and its record have the same.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = np.r_[np.zeros(100), 30.0 - 30.0 * np.cos(np.arange(5000) / 500.0)]
+        >>> log = pt.Dataset(u=u, y=1e-6 * u - 120e-6, dt=0.005).zeroed()
+        >>> f"{1e6 * log.y[0]:.1f} um, {1e6 * log.zero:.1f} um"
+        '0.0 um, -120.0 um'
+        """
+        begun = np.abs(self._u - self._u[0]) > STANDS * float(np.ptp(self._u))
+        still = slice(0, max(1, int(np.argmax(begun))) if begun.any() else self._u.size)
+        counts = ~self._far_of_all[still]
+        if self._left_out is not None:
+            counts &= ~self._left_out[still]
+        # On a straight line where no reading counts.
+        zero = float(np.median(self._y[still][counts] if counts.any() else self._y[still]))
+        part = self._part(0, self._u.size, start=self._start)
+        part._y, part._zero = signal_of("y", self._y - zero), self._zero + zero
+        if self._recorded is not None:
+            part._recorded = signal_of("y", self._recorded - zero, finite=False)
+        return part
+
     def _resampled(self, times: Array, change: Callable[[Array], Array]) -> Dataset:
         """Change all signals and the warm-up; the drive then goes straight between samples."""
-        return Dataset(
+        changed = Dataset(
             u=change(self._u),
             y=change(self._y),
             t=times,
@@ -576,6 +623,8 @@ class Dataset(Viewed):
             source=self._source,
             notes=self._notes,
         )
+        changed._zero = self._zero
+        return changed
 
     def _samples(self, start: float | None, stop: float | None) -> tuple[int, int]:
         """Turn the bounds of a window [s] into indices of the arrays."""

@@ -18,6 +18,7 @@ from ..options import (
     Resample,
     TimeColumn,
     Units,
+    Zero,
     list_files,
 )
 
@@ -36,6 +37,7 @@ def convert_command(
     dt: Interval = None,
     resample: Resample = None,
     decimate: Decimate = None,
+    zero: Zero = False,
     missing: MissingOption = None,
     quiet: Quiet = False,
 ) -> None:
@@ -50,7 +52,7 @@ def convert_command(
     format_to_write(out)
     if out.exists() and not overwrite:
         raise ParameterError(f"{out} exists: expected --overwrite, or another name")
-    log = Columns(time, drive, displacement, unit, dt, decimate).read(
+    log = Columns(time, drive, displacement, unit, dt, decimate, zero).read(
         file, "foh", resample, missing
     )
     written = log.save(out)

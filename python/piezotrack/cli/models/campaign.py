@@ -26,6 +26,7 @@ from ..options import (
     Seconds,
     TimeColumn,
     Units,
+    Zero,
     can_be_folder,
     refuse_without_effect,
     windowed,
@@ -102,6 +103,7 @@ def campaign_command(
     dt: Interval = None,
     resample: Resample = None,
     decimate: Decimate = None,
+    zero: Zero = False,
     missing: MissingOption = None,
     hold: HoldOption = "foh",
     free: Free = None,
@@ -173,7 +175,7 @@ def campaign_command(
         kind: {"model": kind, **of_record, **options.arguments_of(kind)} for kind in kinds.names
     }
     numbers = _seeds(seeds)
-    columns = Columns(time, drive, displacement, unit, dt, decimate)
+    columns = Columns(time, drive, displacement, unit, dt, decimate, zero)
     logs = {
         title: windowed(columns.read(file, hold, resample, missing), file, "--window", window)
         for title, file in _titles(files).items()

@@ -28,6 +28,7 @@ from ..options import (
     Seconds,
     TimeColumn,
     Units,
+    Zero,
     of_file,
     windowed,
 )
@@ -92,6 +93,7 @@ def identify_command(
     dt: Interval = None,
     resample: Resample = None,
     decimate: Decimate = None,
+    zero: Zero = False,
     missing: MissingOption = None,
     hold: HoldOption = "foh",
     free: Free = None,
@@ -165,7 +167,7 @@ def identify_command(
     check_each_log(len(files), delay=delay, drift=drift, history=history, weight=weight)
     if checkpoint is not None and len(kinds.names) > 1:
         raise ParameterError("--checkpoint", "given with several models", "one")
-    columns = Columns(time, drive, displacement, unit, dt, decimate)
+    columns = Columns(time, drive, displacement, unit, dt, decimate, zero)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")
     windows = each_of("--window", window, len(files))

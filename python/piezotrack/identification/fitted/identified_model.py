@@ -124,6 +124,41 @@ class IdentifiedModel(Result):
         return drive_unit_of(self.details, self.model.info)
 
     @property
+    def zero(self) -> float:
+        """Reading of the record identified that `zeroed` subtracted [m]; 0 where nothing was."""
+        return float((self.details.get("zero") or {}).get("value", 0.0))
+
+    def zeroed(self) -> IdentifiedModel:
+        """Return the model with displacements that count from the beginning of its record.
+
+        A reference, a feedforward and a virtual stage of a model are in the displacements that its
+        record has, as from -120 to -74 um. Those of this one begin at 0, as those of
+        ``log.zeroed()``: its offset is less by the reading at the first sample of the record, drift
+        aside, or at rest without drive where the file has no start.
+
+        Returns
+        -------
+        IdentifiedModel
+            Of the same stage; `zero` is what was subtracted.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = 30.0 - 30.0 * np.cos(np.arange(3000) / 100.0)
+        >>> log = pt.Dataset(u=u, y=1e-6 * u - 120e-6, dt=0.005)
+        >>> fit = pt.identify(log, "prandtl-ishlinskii")
+        >>> print(f"{1e6 * fit.offset:.0f} um, {abs(1e6 * fit.zeroed().offset):.0f} um")
+        -120 um, 0 um
+        """
+        begun = 0.0 if self.start is None else float(self.start.state.x)
+        zero = self.offset + begun
+        kept = {one.name: getattr(self, one.name) for one in fields(IdentifiedModel)}
+        subtracted = {"zero": {"value": self.zero + zero, "unit": "m"}}
+        kept |= {"offset": -begun, "records": (), "details": {**self.details, **subtracted}}
+        return IdentifiedModel(**kept)
+
+    @property
     def dt(self) -> float | None:
         """Sampling interval of the record identified [s]; None if the file has none."""
         found = self._record.get("dt_s")
