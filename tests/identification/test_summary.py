@@ -112,3 +112,21 @@ def test_creep_of_no_weight_is_not_counted() -> None:
         creep_weights=(0.0, 0.0), creep_times=(0.1, 1.0),
     )  # fmt: skip
     assert "creep" not in repr(without)
+
+
+@pytest.mark.parametrize("r", [0.0, 0.9])
+def test_standard_deviations_of_correlated_residuals_are_lower_bounds(r: float) -> None:
+    rng, size, stage = np.random.default_rng(5), 3000, pt.DahlStage.xu_li_2010()
+    noise = rng.normal(size=size)
+    for i in range(1, size):
+        noise[i] += r * noise[i - 1]
+    u = 37.5 - 37.5 * np.cos(np.pi * np.arange(size) * 2e-3)
+    data = pt.Dataset(u=u, y=stage.simulate(u, 2e-3).x + 50e-9 * noise, dt=2e-3)
+    held = {name: getattr(stage, name) for name in ("stiffness", "mass", "a1", "a2", "b1")}
+    fit = pt.identify(data, "dahl", parameters=held, method=pt.Descents(seed=1, runs=2))
+    assert fit.autocorrelations == pytest.approx((r,), abs=0.05)
+    text = " ".join(fit.summary().split())
+    assert ("standard deviations are lower bounds" in text) == (r > 0.0)
+    if r:
+        # Of a mean of such values the deviation is so many times that of independent ones.
+        assert number(text.partition("up to about")[2], "times") == pytest.approx(19**0.5, rel=0.2)
