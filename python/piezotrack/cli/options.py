@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Columns",
     "ControlInterval",
+    "Decimate",
     "DisplacementColumn",
     "DriveColumn",
     "Duration",
@@ -88,6 +89,14 @@ Resample = Annotated[
         help="Put a log with gaps or jitter on even times, at this interval in s; default not."
     ),
 ]
+Decimate = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Every Nth sample of the log, after a low-pass filter without lag over all signals; "
+        "for one sampled far above what moves (see `info`), not for steps. Default all.",
+    ),
+]
 MissingOption = Annotated[
     Literal["drop", "fill"] | None,
     typer.Option(
@@ -134,10 +143,11 @@ class Columns:
         displacement: str | None,
         unit: list[str] | None,
         dt: float | None,
+        decimate: int | None = None,
     ) -> None:
         self.time, self.drive, self.displacement = map(column, (time, drive, displacement))
         self.units = {column(name) or name: text for name, text in pairs("--unit", unit)}
-        self.dt = dt
+        self.dt, self.decimate = dt, decimate
 
     def read(
         self,
@@ -149,7 +159,7 @@ class Columns:
         """Read a log with these columns."""
         from ..data.reader import read
 
-        return read(
+        log = read(
             file,
             time=self.time,
             drive=self.drive,
@@ -160,6 +170,10 @@ class Columns:
             hold=hold,
             missing=missing,
         )
+        if self.decimate in (None, 1):
+            return log
+        with of_file(file):
+            return log.decimate(self.decimate)
 
     def read_drive(self, file: Path) -> Dataset:
         """Read a drive with these columns."""

@@ -6,6 +6,7 @@ from ...errors import ParameterError
 from ..error_messages import report_errors
 from ..options import (
     Columns,
+    Decimate,
     DisplacementColumn,
     DriveColumn,
     Interval,
@@ -34,6 +35,7 @@ def convert_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    decimate: Decimate = None,
     missing: MissingOption = None,
     quiet: Quiet = False,
 ) -> None:
@@ -48,7 +50,9 @@ def convert_command(
     format_to_write(out)
     if out.exists() and not overwrite:
         raise ParameterError(f"{out} exists: expected --overwrite, or another name")
-    log = Columns(time, drive, displacement, unit, dt).read(file, "foh", resample, missing)
+    log = Columns(time, drive, displacement, unit, dt, decimate).read(
+        file, "foh", resample, missing
+    )
     written = log.save(out)
     if not quiet:
         print(f"{len(log)} samples, {log.duration:.6g} s at {1.0 / log.dt:.6g} Hz")

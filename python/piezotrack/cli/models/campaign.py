@@ -14,6 +14,7 @@ from ..error_messages import report_errors
 from ..interruption import acknowledge_interrupt
 from ..options import (
     Columns,
+    Decimate,
     DisplacementColumn,
     DriveColumn,
     HoldOption,
@@ -100,6 +101,7 @@ def campaign_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    decimate: Decimate = None,
     missing: MissingOption = None,
     hold: HoldOption = "foh",
     free: Free = None,
@@ -171,7 +173,7 @@ def campaign_command(
         kind: {"model": kind, **of_record, **options.arguments_of(kind)} for kind in kinds.names
     }
     numbers = _seeds(seeds)
-    columns = Columns(time, drive, displacement, unit, dt)
+    columns = Columns(time, drive, displacement, unit, dt, decimate)
     logs = {
         title: windowed(columns.read(file, hold, resample, missing), file, "--window", window)
         for title, file in _titles(files).items()

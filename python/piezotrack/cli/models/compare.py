@@ -11,6 +11,7 @@ from ...stages.model_info import LISTED
 from ..error_messages import report_errors
 from ..options import (
     Columns,
+    Decimate,
     DisplacementColumn,
     DriveColumn,
     HoldOption,
@@ -66,6 +67,7 @@ def compare_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    decimate: Decimate = None,
     missing: MissingOption = None,
     hold: HoldOption = "foh",
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
@@ -87,7 +89,7 @@ def compare_command(
         )
 
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    columns = Columns(time, drive, displacement, unit, dt)
+    columns = Columns(time, drive, displacement, unit, dt, decimate)
     log = columns.read(file, hold, resample, missing)
     fitted = None if train is None else seconds("--train", train)
     judged = None if test is None else seconds("--test", test)

@@ -14,6 +14,7 @@ from ..error_messages import report_errors
 from ..interruption import acknowledge_interrupt
 from ..options import (
     Columns,
+    Decimate,
     DisplacementColumn,
     DriveColumn,
     HoldOption,
@@ -90,6 +91,7 @@ def identify_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    decimate: Decimate = None,
     missing: MissingOption = None,
     hold: HoldOption = "foh",
     free: Free = None,
@@ -163,7 +165,7 @@ def identify_command(
     check_each_log(len(files), delay=delay, drift=drift, history=history, weight=weight)
     if checkpoint is not None and len(kinds.names) > 1:
         raise ParameterError("--checkpoint", "given with several models", "one")
-    columns = Columns(time, drive, displacement, unit, dt)
+    columns = Columns(time, drive, displacement, unit, dt, decimate)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")
     windows = each_of("--window", window, len(files))
