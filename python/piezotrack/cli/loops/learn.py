@@ -43,7 +43,7 @@ from .loop_options import (
     simulated,
     unit_of,
 )
-from .track import BeyondReach, parsed_reference
+from .track import BeyondReach  # noqa: TC001 - read by typer
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -132,13 +132,14 @@ def learn_command(
     from ...control.learning.learn import learn
     from ...control.timing import Timing
     from ...identification.fitted.model_file import load
+    from ...references.parse import reference_of
 
     own = stage != PAPER
     settings = Loop(own, dt, limits, feedback, kp, ti, td)
     _check_options(context, settings, device, noise_nm)
     _check_file(out)
     known = load(model) if own else driven_by_voltage(load(model), model)
-    desired = parsed_reference(reference, duration, period)
+    desired = reference_of(reference, duration=duration, period=period)
     result = Output(out.parent, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write([out.name, *(picture_files(out.stem) if picture else [])])
     plays: AbstractContextManager[VirtualStage | Device] = (

@@ -11,7 +11,6 @@ from ..devices.connection import DeviceAddress, Rest, connected
 from ..error_messages import report_errors
 from ..options import Duration, Json, Out, Overwrite, Period, Quiet  # noqa: TC001, typer reads it
 from ..output import Output
-from .track import parsed_reference
 
 __all__ = ["play_command"]
 
@@ -45,9 +44,10 @@ def play_command(
     from ...control.controller.load import load_controller
     from ...control.on_device.playing import play
     from ...identification.fitted.model_file import load
+    from ...references.parse import reference_of
 
     forward = load_controller(file) if rate is None else load(file).inverse()
-    desired = parsed_reference(reference, duration, period)
+    desired = reference_of(reference, duration=duration, period=period)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     with connected(device) as used:

@@ -56,7 +56,6 @@ if TYPE_CHECKING:
 __all__ = [
     "BeyondReach",
     "feedforward_command",
-    "parsed_reference",
     "track_command",
 ]
 
@@ -155,10 +154,11 @@ def track_command(
     from ...control.running.track import track
     from ...control.timing import Timing
     from ...identification.fitted.model_file import load
+    from ...references.parse import reference_of
 
     if device is not None:
         refuse_without_effect(context, SIMULATED, "with --device")
-        desired = parsed_reference(reference, duration, period)
+        desired = reference_of(reference, duration=duration, period=period)
         result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
         _on_device(model, device, desired, result, beyond_reach=beyond_reach, unstable=unstable)
         return
@@ -176,7 +176,7 @@ def track_command(
     if own and not (noise_nm or jitter):
         refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
     known = load(model) if own else driven_by_voltage(load(model), model)
-    desired = parsed_reference(reference, duration, period)
+    desired = reference_of(reference, duration=duration, period=period)
     playback: Literal["table", "online"] = "online" if online else "table"
     loop = Controller(
         dt=settings.dt(known, desired),
@@ -287,9 +287,10 @@ def feedforward_command(
     from ...control.plant import plant_of
     from ...control.views.tracking_plot import plot_feedforward
     from ...identification.fitted.model_file import load
+    from ...references.parse import reference_of
 
     known = load(model)
-    desired = parsed_reference(reference, duration, period)
+    desired = reference_of(reference, duration=duration, period=period)
     settings = Loop(True, dt, limits, None, None, None, None)
     interval = settings.dt(known, desired)
     # A file without a record has no range.
@@ -333,15 +334,3 @@ def feedforward_command(
         "notes": notes,
     }
     result.show("\n".join(lines), document, written)
-
-
-def parsed_reference(text: str, duration: float | None, period: float | None) -> Reference:
-    """Read the reference from a file if the text names one, else parse the text."""
-    from ...references.parse import parse_reference
-    from ...references.reference import read_reference
-
-    if Path(text).is_file():
-        return read_reference(text, duration=duration, period=period)
-    if period is not None:
-        raise ParameterError("--period", "for a reference from a file", f"none with {text}")
-    return parse_reference(text, duration=duration)

@@ -13,7 +13,6 @@ from ..error_messages import report_errors
 from ..options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  # noqa: TC001 - read by typer
 from ..output import Output
 from .loop_options import AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise, noise_metres
-from .track import parsed_reference
 
 __all__ = ["tune_command"]
 
@@ -89,6 +88,7 @@ def tune_command(
     from ...control.tuning.tune import tune
     from ...control.tuning.tuned import picture_name
     from ...identification.fitted.model_file import load
+    from ...references.parse import reference_of
     from ...stages.virtual import VirtualStage
 
     _within("--gain-margin", gain_margin, 1.0, math.inf, "a factor above 1")
@@ -100,7 +100,7 @@ def tune_command(
     margins = Margins(gain=gain_margin, phase=math.radians(phase_margin), sensitivity=sensitivity)
     spread = Spread(delay=(0.0, delay_spread), mode=0.01 * mode_spread, gain=0.01 * gain_spread)
     known = load(model)
-    desired = [parsed_reference(text, duration, period) for text in reference or ()]
+    desired = [reference_of(text, duration=duration, period=period) for text in reference or ()]
     settings = Loop(True, dt, limits, None, None, None, None)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     pictures = [name for i in range(len(desired)) for name in picture_files(picture_name(i))]
