@@ -130,3 +130,20 @@ def test_standard_deviations_of_correlated_residuals_are_lower_bounds(r: float) 
     if r:
         # Of a mean of such values the deviation is so many times that of independent ones.
         assert number(text.partition("up to about")[2], "times") == pytest.approx(19**0.5, rel=0.2)
+
+
+@pytest.mark.parametrize("entry", [None, "much", {}, {"value": "much"}, {"value": 1e-6}])
+def test_a_file_with_a_part_of_the_errors_prints_that_part(entry: object) -> None:
+    model = pt.identification.IdentifiedModel(
+        model=STAGE,
+        offset=0.0,
+        offset_fitted=False,
+        stroke=1e-4,
+        details={"fit": {"cost": {"value": 1e-7}, "max_error": entry, "noise": entry}},
+    )
+    errors = row(model.summary(), "rms error")
+    assert number(errors, "nm") == 100.0
+    # No largest error without its time.
+    assert "largest" not in errors
+    assert ("noise 1 um" in errors) == (entry == {"value": 1e-6})
+    assert "gain" not in model.summary()
