@@ -33,6 +33,8 @@ def test_the_time_of_the_largest_error_is_that_of_the_record(when: float) -> Non
     assert score.max_error_time == pytest.approx(when, abs=1e-9)
     assert score.max_error == pytest.approx(3e-6, rel=0.1)
     assert f"at {when:g} s" in str(score)
+    # A notebook shows it as it is printed.
+    assert str(score) in repr(score)
 
 
 def test_the_share_that_was_fitted_is_counted_by_samples(tmp_path: Path) -> None:

@@ -112,3 +112,38 @@ def test_creep_of_no_weight_is_not_counted() -> None:
         creep_weights=(0.0, 0.0), creep_times=(0.1, 1.0),
     )  # fmt: skip
     assert "creep" not in repr(without)
+
+
+@pytest.mark.parametrize("r", [0.0, 0.9])
+def test_standard_deviations_of_correlated_residuals_are_lower_bounds(r: float) -> None:
+    rng, size, stage = np.random.default_rng(5), 3000, pt.DahlStage.xu_li_2010()
+    noise = rng.normal(size=size)
+    for i in range(1, size):
+        noise[i] += r * noise[i - 1]
+    u = 37.5 - 37.5 * np.cos(np.pi * np.arange(size) * 2e-3)
+    data = pt.Dataset(u=u, y=stage.simulate(u, 2e-3).x + 50e-9 * noise, dt=2e-3)
+    held = {name: getattr(stage, name) for name in ("stiffness", "mass", "a1", "a2", "b1")}
+    fit = pt.identify(data, "dahl", parameters=held, method=pt.Descents(seed=1, runs=2))
+    assert fit.autocorrelations == pytest.approx((r,), abs=0.05)
+    text = " ".join(fit.summary().split())
+    assert ("standard deviations are lower bounds" in text) == (r > 0.0)
+    if r:
+        # Of a mean of such values the deviation is so many times that of independent ones.
+        assert number(text.partition("up to about")[2], "times") == pytest.approx(19**0.5, rel=0.2)
+
+
+@pytest.mark.parametrize("entry", [None, "much", {}, {"value": "much"}, {"value": 1e-6}])
+def test_a_file_with_a_part_of_the_errors_prints_that_part(entry: object) -> None:
+    model = pt.identification.IdentifiedModel(
+        model=STAGE,
+        offset=0.0,
+        offset_fitted=False,
+        stroke=1e-4,
+        details={"fit": {"cost": {"value": 1e-7}, "max_error": entry, "noise": entry}},
+    )
+    errors = row(model.summary(), "rms error")
+    assert number(errors, "nm") == 100.0
+    # No largest error without its time.
+    assert "largest" not in errors
+    assert ("noise 1 um" in errors) == (entry == {"value": 1e-6})
+    assert "gain" not in model.summary()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from ... import _core
 from ..._support.statistics import sample_noise
 from ...data.checks import diagnostics
 from ...data.checks.connections import unusual_connection
@@ -165,6 +166,14 @@ class Identification(IdentifiedModel):
         """
         return tuple(
             min(sample_noise(data.y), sample_noise(data.y - run.x))
+            for (data, _), run in zip(self._fitted, self._responses, strict=True)
+        )
+
+    @property
+    def autocorrelations(self) -> tuple[float, ...]:
+        """Correlation of neighbouring residuals of each record, as `ModelScore.autocorrelation`."""
+        return tuple(
+            float(_core.residual(data.counted(data.y - run.x), 0)[2])
             for (data, _), run in zip(self._fitted, self._responses, strict=True)
         )
 

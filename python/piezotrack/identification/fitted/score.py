@@ -10,7 +10,7 @@ from .notes import fit_percent
 __all__ = ["Score", "share_fitted"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Score:
     """Deviation of a simulated displacement from the measured one.
 
@@ -58,6 +58,9 @@ class Score:
         100 for an exact model; 0 for one that is no better than the mean of the record.
         """
         return fit_percent(self.rms, self.spread)
+
+    def __repr__(self) -> str:
+        return f"<Score, {self}>"
 
     def __str__(self) -> str:
         fit = "" if math.isnan(self.spread) else f", fit {self.fit_percent:.4g} %"

@@ -200,7 +200,7 @@ def _errors(
     """Rms and largest error side by side with the noise."""
     most, when = largest
     text = f"{length_text(rms, 3)} ({100.0 * rms / stroke:.3g} % of stroke)"
-    if not math.isnan(most):
+    if not (math.isnan(most) or math.isnan(when)):
         text += f", largest {length_text(most, 3)} at {when:.6g} s"
     if noise > 0.0:
         text += f", noise {length_text(noise, 3)}"

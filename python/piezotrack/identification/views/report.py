@@ -29,6 +29,8 @@ __all__ = [
     "summary_text",
 ]
 
+# Correlation of neighbouring residuals from which on standard deviations are too small.
+CORRELATED = 0.3
 # Units of values that a stage gives in um, and the factor for a drive in metres.
 PER_METRE = {"um/V": ("um/um", 1e-6), "1/V": ("1/um", 1e-6)}
 
@@ -133,7 +135,7 @@ def _trials(fit: Identification) -> list[str]:
         return []
     width = max(len(trial.title) for trial in chosen.trials)
     return [
-        f"      chosen by the rms after {chosen.fitted_until:.4g} s, fitted before that:",
+        f"      models fitted up to {chosen.fitted_until:.4g} s, by their rms after it:",
         *(
             f"        {trial.title:<{width}}  {100 * trial.rms / fit.stroke:7.3g} %"
             f"  {trial.seconds:5.1f} s"
@@ -156,8 +158,7 @@ def _estimates(fit: Identification) -> list[str]:
     width = 1 + max(3, *(len(estimate.symbol) for estimate in fit.parameters.values()))
     lines.append(f"  {'':<18}{'':<{width}}{'value':>13}  {'':<9}{'standard deviation'}")
     lines += [_row(fit, name, estimate, width) for name, estimate in fit.parameters.items()]
-    lines += _lists(fit)
-    lines += _constraints(fit)
+    lines += [*_lists(fit), *_constraints(fit), *_correlated(fit)]
     which = "this record" if len(fit.records) == 1 else "these records"
     if unclear := [n for n, e in fit.parameters.items() if not (e.identified or e.from_prior)]:
         lines += ["", f"Not determined by {which}: " + ", ".join(unclear) + "."]
@@ -189,6 +190,25 @@ def _lists(fit: IdentifiedModel) -> list[str]:
     return [
         f"  {count} value{'s' * (count > 1)} each, in the model file: {', '.join(names)}"
         for count, names in counted.items()
+    ]
+
+
+def _correlated(fit: Identification) -> list[str]:
+    """Say that the standard deviations are too small, where residuals are correlated.
+
+    Of residuals x_i = r x_(i-1) + white noise, and a parameter that shows slowly, they are so by
+    sqrt((1 + r) / (1 - r)) (Bartlett 1935, doi 10.2307/2342284).
+    """
+    stated = [one.deviation for one in fit.parameters.values() if one.free and one.deviation]
+    known = [one for one in fit.autocorrelations if one > CORRELATED]
+    if not known or not any(map(math.isfinite, stated)):
+        return []
+    r = min(max(known), 1.0 - 1e-9)
+    factor = math.sqrt((1.0 + r) / (1.0 - r))
+    return [
+        "",
+        f"Neighbouring residuals correlate by {r:.2g}: the standard deviations are lower bounds,",
+        f"up to about {factor:.2g} times too small.",
     ]
 
 
