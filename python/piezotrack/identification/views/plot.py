@@ -154,8 +154,11 @@ def plot_time(
         below.axvline(fitted_until, **QUIET)
     above.margins(x=0.0, y=0.05)
     legend_inside(above)
+    t = data.t
+    if data.inserted is not None:
+        t, error = t[~data.inserted], error[~data.inserted]
     kept = thinned(error)
-    below.plot(data.t[kept], fine * error[kept], **{**ERROR, "linewidth": 0.8})
+    below.plot(t[kept], fine * error[kept], **{**ERROR, "linewidth": 0.8})
     below.axhline(0.0, **GUIDE)
     below.set(xlabel="time [s]", ylabel=f"error [{small}]")
     rms = float(np.sqrt(np.mean(error**2)))
