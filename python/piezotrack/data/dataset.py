@@ -41,6 +41,9 @@ __all__ = ["Dataset", "Hold"]
 
 Hold = Literal["foh", "zoh"]
 
+# Share of its range by which a drive has left its first sample.
+STANDS = 2e-3
+
 
 class Dataset(Viewed):
     """An evenly sampled record of one axis, in seconds, volts and metres.
@@ -151,7 +154,7 @@ class Dataset(Viewed):
         self._columns, self._column_units = further_columns(columns, column_units, self._u)
         self._hold, self._drive_unit, self._source = hold, drive_unit, source
         self._notes = (*map(str, notes), *filled.notes)
-        self._start = 0
+        self._start, self._zero = 0, 0.0
         self._sha256: str | None = None
         self._far: Mask | None = None
         # Samples that `interpolate` put between the measured ones, and the interval of these.
@@ -323,6 +326,10 @@ class Dataset(Viewed):
         """
         return None if self._inserted is None else self._inserted[self._start :]
 
+    def at_readings(self, values: Array) -> Array:
+        """Return the entries of values in the window without those at `inserted` samples."""
+        return values if self.inserted is None else values[~self.inserted]
+
     @property
     def measured(self) -> Dataset:
         """The record without the samples of `inserted`; the record itself without any."""
@@ -339,10 +346,11 @@ class Dataset(Viewed):
     @property
     def far(self) -> Mask:
         """Samples in the window that are single readings far off, shape (n,)."""
-        return self._all_far()[self._start :]
+        return self._far_of_all[self._start :]
 
-    def _all_far(self) -> Mask:
-        """Return the single readings far off, those of the warm-up too."""
+    @property
+    def _far_of_all(self) -> Mask:
+        """Single readings far off, those of the warm-up too."""
         if self._far is None:
             kept = slice(None) if self._inserted is None else ~self._inserted
             self._far = np.zeros(self._u.size, dtype=np.bool_)
@@ -394,7 +402,7 @@ class Dataset(Viewed):
             return self
         part = self._part(0, self._u.size, start=self._start)
         # Those of the warm-up, which does not count, have no effect.
-        apart = self._all_far()
+        apart = self._far_of_all
         mask = apart if self._left_out is None else self._left_out | apart
         part._recorded = self._y if self._recorded is None else self._recorded
         part._y, part._left_out = signal_of("y", bridged(self._y, mask)), mask
@@ -449,6 +457,11 @@ class Dataset(Viewed):
     def full(self) -> Dataset:
         """The window together with its warm-up, all of them as ordinary samples."""
         return self._part(0, self._u.size, start=0)
+
+    @property
+    def zero(self) -> float:
+        """Displacement of the source that `zeroed` subtracted [m]; 0 where nothing was."""
+        return self._zero
 
     @property
     def duration(self) -> float:
@@ -609,9 +622,43 @@ class Dataset(Viewed):
         fine._measured_dt = self.measured_dt
         return fine._part(0, len(fine), start=self._start * factor)
 
+    def zeroed(self) -> Dataset:
+        """Return the record with displacements that count from its beginning.
+
+        What is subtracted is the median of the readings, warm-up included, up to where the drive
+        first leaves its first sample by 0.2 % of its range; the first reading where it moves at
+        once. Readings that do not count are left aside.
+
+        Returns
+        -------
+        Dataset
+            The record, whose `zero` is what was subtracted. A window and its record have the same.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = np.r_[np.zeros(100), 30.0 - 30.0 * np.cos(np.arange(5000) / 500.0)]
+        >>> log = pt.Dataset(u=u, y=1e-6 * u - 120e-6, dt=0.005).zeroed()
+        >>> f"{1e6 * log.y[0]:.1f} um, {1e6 * log.zero:.1f} um"
+        '0.0 um, -120.0 um'
+        """
+        begun = np.abs(self._u - self._u[0]) > STANDS * float(np.ptp(self._u))
+        still = slice(0, max(1, int(np.argmax(begun))) if begun.any() else self._u.size)
+        counts = ~self._far_of_all[still]
+        if self._left_out is not None:
+            counts &= ~self._left_out[still]
+        # On a straight line where no reading counts.
+        zero = float(np.median(self._y[still][counts] if counts.any() else self._y[still]))
+        part = self._part(0, self._u.size, start=self._start)
+        part._y, part._zero = signal_of("y", self._y - zero), self._zero + zero
+        if self._recorded is not None:
+            part._recorded = signal_of("y", self._recorded - zero, finite=False)
+        return part
+
     def _resampled(self, times: Array, change: Callable[[Array], Array]) -> Dataset:
         """Change all signals and the warm-up; the drive then goes straight between samples."""
-        return Dataset(
+        changed = Dataset(
             u=change(self._u),
             y=change(self._y),
             t=times,
@@ -622,6 +669,8 @@ class Dataset(Viewed):
             source=self._source,
             notes=self._notes,
         )
+        changed._zero = self._zero
+        return changed
 
     def _preceded(self, u: float) -> Dataset:
         """Put a sample with a drive of `u` before all others; its displacement does not count."""

@@ -196,8 +196,7 @@ def judged(data: Dataset, left: Array) -> float:
     float
         Mean over the classes of blocks, between reversals, that differ in amplitude or rate.
     """
-    if (inserted := data.inserted) is not None:
-        data, left = data.measured, left[~inserted]
+    left, data = data.at_readings(left), data.measured
     turns = _core.turns(data.u, 0.05 * float(np.ptp(data.u)))
     # Parts of blocks at the ends differ in amplitude by chance.
     blocks = [slice(a, b) for a, b in pairwise(turns)]
