@@ -234,7 +234,7 @@ impl Base {
         let squares = product(&residual, &residual);
         let directions = directions.len();
         let rows = read.len() - level.left_out.len();
-        Block { square, slope, columns, read, rows, drift, stride, directions, squares }
+        Block { square, slope, columns, read, drift, rows, stride, directions, squares }
     }
 }
 
