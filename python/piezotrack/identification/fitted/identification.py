@@ -164,9 +164,10 @@ class Identification(IdentifiedModel):
 
         0 for a record of fewer than 16 samples.
         """
+        pairs = zip(self._fitted, self._responses, strict=True)
         return tuple(
-            min(sample_noise(data.y), sample_noise(data.y - run.x))
-            for (data, _), run in zip(self._fitted, self._responses, strict=True)
+            min(sample_noise(data.measured.y), sample_noise(data.at_readings(data.y - run.x)))
+            for (data, _), run in pairs
         )
 
     @property
@@ -204,6 +205,11 @@ class Identification(IdentifiedModel):
             source = f" ({data.source})" if data.source else ""
             which = f"record {i + 1}{source}: " if several else ""
             notes += [which + note for note in self._notes_on(data, record, run)]
+        if self.interpolation:
+            notes.append(
+                "the drive is fast for its sampling rate: it is interpolated to "
+                f"{self.interpolation} times the rate, which fits better than straight lines"
+            )
         if info.drive_unit == "N" and unit != "N":
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
         rates = [_frequency(data) for data, _ in self._fitted]
@@ -220,9 +226,10 @@ class Identification(IdentifiedModel):
 
     def _notes_on(self, data: Dataset, record: FittedRecord, run: Response) -> list[str]:
         """Warnings about one of the records and the fit there."""
-        notes, rest = diagnostics.record_warnings(data), data.y - run.x
-        if data.left_out is not None:
-            rest[data.left_out] = data.counted(rest).mean()
+        notes, rest, measured = diagnostics.record_warnings(data), data.y - run.x, data.measured
+        rest = data.at_readings(rest)
+        if measured.left_out is not None:
+            rest[measured.left_out] = measured.counted(rest).mean()
         if record.cost_percent > 5.0:
             notes.append(
                 "the model does not fit this record: the residual is "
@@ -236,15 +243,15 @@ class Identification(IdentifiedModel):
             )
         notes += drift_notes(record.drift, record.stroke)
         notes += self.model._notes(lambda: run)
-        lines = hum_lines(rest, data.u, data.y, data.dt)
+        lines = hum_lines(rest, measured.u, measured.y, measured.dt)
         notes += hum_notes(lines)
         if self.selection:
             # A mode moves from sample to sample as noise does; what is left of it hardly does.
             without_hum = (
                 math.sqrt(max(record.cost**2 - power_of(lines), 0.0)) if lines else record.cost
             )
-            notes += above_noise(without_hum, min(sample_noise(data.y), sample_noise(rest)))
-        return notes + first_samples(rest, data)
+            notes += above_noise(without_hum, min(sample_noise(measured.y), sample_noise(rest)))
+        return notes + first_samples(rest, measured)
 
     @property
     def success(self) -> bool:

@@ -14,7 +14,9 @@ from ..._support.arguments import expect
 from ..._support.arrays import LARGEST, check_dt, signal_of
 from ..._support.display.result import Result
 from ..._support.files.writing import write_document
+from ...data.checks.fast_drive import CURVED, is_fast
 from ...data.dataset import Dataset
+from ...data.resampling import interpolated
 from ...errors import ParameterError, ShapeError
 from ...stages.slow_loop import SlowLoop
 from .delayed_reading import delayed_reading
@@ -84,6 +86,9 @@ class IdentifiedModel(Result):
         What each of several records identified has of its own; `offset`, `delay` and `start` are
         those of the first, and `stroke` is the largest. Of one record: a result has it alone, a
         model from a file has none.
+    interpolation : int or None
+        Samples to which each of a record whose drive is fast for its sampling rate is interpolated,
+        as in the fit: band-limited. None where the drive goes straight from sample to sample.
     details : mapping
         Other entries of the model file: fit, provenance.
     """
@@ -105,6 +110,7 @@ class IdentifiedModel(Result):
     start: Start | None = None
     drift: Drift | None = None
     records: tuple[FittedRecord, ...] = ()
+    interpolation: int | None = None
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
@@ -375,19 +381,26 @@ class IdentifiedModel(Result):
                 verb="has",
             )
         state = self._begins(data, history, initial)
-        start = data.warmup
-        run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = delayed_reading(self.model.info, run, self._delay_on(data))[start:] + self._drift_on(
-            data
-        )
-        signals = {
-            signal.name: value[start:]
+        run, x, kept = self._motion(data, state)
+        signals: dict[str, Any] = {
+            signal.name: value[kept]
             for signal in fields(run)
             if isinstance(value := getattr(run, signal.name), np.ndarray)
         }
         signals |= {"t": data.t, "u": data.u, "x": x}
         windowed: Response = replace(run, **signals)
         return windowed
+
+    def _motion(self, data: Dataset, state: StageState) -> tuple[Response, Array, slice]:
+        """Response, displacement as it is read in the window, and which samples are in that."""
+        u, dt, factor = data.full.u, data.dt, 1
+        if self.interpolation and data.inserted is None and is_fast(data, CURVED):
+            factor = self.interpolation
+            u, dt = interpolated(u, factor), dt / factor
+        run = self.model.simulate(u, dt, hold=data.hold, initial=state)
+        kept = slice(factor * data.warmup, None, factor)
+        x = delayed_reading(self.model.info, run, self._delay_on(data))[kept]
+        return run, x + self._drift_on(data), kept
 
     def _added(
         self, data: Dataset, x: Array, offset: float | Literal["own"]
@@ -494,10 +507,7 @@ class IdentifiedModel(Result):
 
     def _residual(self, data: Dataset, state: StageState) -> Array:
         """Measured less simulated displacement in the window, without offset [m]."""
-        run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = delayed_reading(self.model.info, run, self._delay_on(data))[
-            data.warmup :
-        ] + self._drift_on(data)
+        x = self._motion(data, state)[1]
         rest: Array = data.y - x - self._added(data, x, "own")[0]
         return rest
 
@@ -646,6 +656,7 @@ class IdentifiedModel(Result):
             "delay": {"value": self.delay, "unit": "s"} | delay,
             "start": start_entry(self.start, self.drive_unit),
             **drift_entry(self.drift),
+            **({"interpolation": self.interpolation} if self.interpolation else {}),
             **record_entries(self.records, self.drive_unit),
             **details,
         }

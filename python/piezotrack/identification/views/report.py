@@ -121,7 +121,8 @@ def _of_several(fit: Identification) -> list[str]:
 
 
 def _size(data: Dataset) -> str:
-    """Write the size of a record."""
+    """Write the size of a record, as it was measured."""
+    data = data.measured
     return (
         f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
         f"stroke {1e6 * data.stroke:.4g} um"
