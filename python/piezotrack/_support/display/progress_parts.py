@@ -94,7 +94,7 @@ def part_at_work() -> Part:
 
 
 class Parts:
-    """What is at work, in parts.
+    """Parts of a computation, for its progress.
 
     Parameters
     ----------
