@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from importlib import import_module
 from pathlib import Path
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 mpl.use("Agg")
+
+# Lines that commands print stay whole, whatever terminal the tests are started from.
+os.environ.pop("COLUMNS", None)
 
 # A background job inherits SIGINT as ignored and passes that on to what it starts: without this the
 # tests of Ctrl-C would wait for an interruption that never comes.

@@ -66,7 +66,7 @@ def judge(case: Case) -> dict[str, Any]:
             *data.notes,
             *fit.notes,
             # How the record begins, and a drift or a delay that was fitted.
-            *(line.strip() for line in fit.summary().splitlines()[2:4]),
+            *re.findall(r"^  ((?:start|drift|delay) .*)$", fit.summary(), re.MULTILINE),
             *(f"other motion: {note}" for note in score.notes),
         ],
     }

@@ -104,7 +104,7 @@ def test_a_notebook_shows_tables_without_markup_of_the_record() -> None:
         assert table.startswith("<table>")
         assert table.endswith("</table>")
         assert "<log>" not in table
-    assert f"{fit().cost_um:.4g} um" in fit()._repr_html_()
+        assert f"{fit().cost_percent:.3g} % of stroke" in fit()._repr_html_()
     assert "120 um" in log()._repr_html_()
     assert "&lt;log&gt;.csv" in log()._repr_html_()
 

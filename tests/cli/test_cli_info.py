@@ -112,3 +112,44 @@ def test_missing_readings_are_refused_with_the_option_that_takes_them() -> None:
     assert pt.read("filled.npz").left_out is None
     # A command without the option does not name it.
     assert "--missing" not in refusal("noise", "lost.csv")
+
+
+def test_a_log_is_decimated_as_in_python() -> None:
+    t = np.arange(40_000) / 5000.0
+    u = 60.0 * np.sin(2.0 * np.pi * t)
+    noise = 1e-8 * np.random.default_rng(1).standard_normal(t.size)
+    fast = pt.read(pt.Dataset(u=u, y=1e-6 * u + noise, t=t).save("fast.csv"))
+    said = ran("info", "fast.csv")
+    assert "250 Hz are enough, --decimate 20" in said
+    ran("convert", "fast.csv", "slow.npz", "--decimate", "20")
+    slow = pt.read("slow.npz")
+    assert slow.dt == pytest.approx(0.004)
+    assert np.array_equal(slow.y, fast.decimate(20).y)
+    # The same log, whole, with a factor of 1.
+    ran("convert", "fast.csv", "whole.npz", "--decimate", "1")
+    assert len(pt.read("whole.npz")) == 40_000
+
+
+@pytest.mark.parametrize("factor", ["0", "-3", "999"])
+def test_a_factor_that_leaves_nothing_is_refused(factor: str) -> None:
+    said = refusal("convert", "log.csv", "out.npz", "--decimate", factor)
+    assert f"log.csv: --decimate is {factor}" in said
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_identify_and_compare_decimate() -> None:
+    kind = ("--model", "prandtl-ishlinskii")
+    t = np.arange(1600) / 200.0
+    u = (5.0 - 0.4 * t) * np.sin(2.0 * np.pi * t)
+    y = 1e-6 * u + 1e-8 * np.random.default_rng(1).standard_normal(t.size)
+    pt.Dataset(u=u, y=y, t=t).save("log.csv")
+    ran("convert", "log.csv", "half.npz", "--decimate", "2")
+    words = ("--decimate", "2", "--json", "--out")
+    one = json.loads(ran("identify", "log.csv", *kind, *words, "one"))
+    two = json.loads(ran("identify", "half.npz", *kind, "--json", "--out", "two"))
+    assert one["models"][0]["parameters"] == two["models"][0]["parameters"]
+    one = json.loads(ran("compare", "log.csv", *kind, *words, "three"))
+    two = json.loads(ran("compare", "half.npz", *kind, "--json", "--out", "four"))
+    for table in (one, two):
+        table.pop("written")
+    assert str(one).replace("log.csv", "half.npz") == str(two)

@@ -260,3 +260,37 @@ def test_an_interval_beyond_sense_is_a_problem(tmp_path: Path) -> None:
     found = pt.data.info(path)
     assert "1e+300" in found.problem
     assert found.time is None
+
+
+def test_a_log_sampled_far_above_its_drive_names_the_rate_that_is_enough(tmp_path: Path) -> None:
+    t = np.arange(50_000) / 5000.0
+    fast = pt.data.info(written(tmp_path, 150.0 * np.sin(2.0 * np.pi * t), t=t))
+    (note,) = fast.notes
+    assert note.startswith("5 kHz for a 1 Hz drive: 200 Hz are enough")
+    # What is said loses nothing: a line between the samples that remain is the drive.
+    factor = int(re.search(r"decimate\((\d+)\)", note)[1])  # type: ignore[index]
+    log = pt.read(tmp_path / "log.npz")
+    less = log.decimate(factor)
+    assert np.abs(np.interp(log.t, less.t, less.u) - log.u)[:-factor].max() < 1e-3 * np.ptp(log.u)
+    # Nothing is said of the lower rate, nor of one that the drive needs.
+    assert pt.data.info(less.save(tmp_path / "less.npz")).notes == ()
+    assert pt.data.info(written(tmp_path, 150.0 * np.sin(50.0 * np.pi * t), t=t)).notes == ()
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.004])
+def test_nothing_is_said_of_the_rate_of_steps(tmp_path: Path, rise: float) -> None:
+    t = np.arange(50_000) / 5000.0
+    u = np.clip(((t % 2.0) - 0.5) / max(rise, 1e-9), 0.0, 1.0) * (t % 2.0 < 1.5)
+    assert pt.data.info(written(tmp_path, 60.0 * u, t=t)).notes == ()
+
+
+@pytest.mark.parametrize("frequency", [3.0, 40.0])
+def test_the_fastest_part_of_a_drive_says_the_rate(frequency: float) -> None:
+    from piezotrack.data.checks.sampling_rate import spare_factor
+
+    t = np.arange(100_000) / 20_000.0
+    burst = np.where(t > 4.5, 0.5 * np.sin(2.0 * np.pi * frequency * t), 0.0)
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(t.size)
+    factor = spare_factor(np.sin(2.0 * np.pi * t) + burst + noise, 5e-5)
+    samples = 20_000.0 / factor / frequency
+    assert (factor == 1) if frequency == 40.0 else (100.0 < samples < 260.0)

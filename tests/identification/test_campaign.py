@@ -475,6 +475,9 @@ def test_the_table_shows_how_far_seeds_agree(tmp_path: Path) -> None:
     assert words[2:5] == ["quick", "3", f"{min(costs):.4g}"]
     agree = sum(cost <= 1.001 * min(costs) for cost in costs)
     assert words[7] == str(agree)
+    # One result has no median and no highest, and agrees with none.
+    single = [line.split() for line in found.summary().splitlines() if f" {PLAYS} " in line]
+    assert single[0][-4:-1] == ["-", "-", "-"]
     assert "<td>quick</td>" in found._repr_html_()
     assert repr(found) == "<Campaign, 1 record, 2 models, 4 tasks; see summary()>"
 

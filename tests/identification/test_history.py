@@ -57,7 +57,7 @@ def test_the_voltage_that_the_stage_came_from_is_found() -> None:
     assert fit.start.history == "fit"
     assert fit.start.voltage == pytest.approx(75.0, abs=5.0)
     assert fit.parameters["voltage_before"].identified
-    assert "which was fitted" in fit.summary()
+    assert "after an earlier drive of 7" in fit.summary()
     assert any("first" in note for note in wrong.notes)
 
 

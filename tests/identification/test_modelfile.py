@@ -328,7 +328,9 @@ def test_offsets_of_a_record_of_its_own() -> None:
         np.linalg.norm(moved.y - moved.y.mean())
     )
     assert none.fit_percent == pytest.approx(100.0 * explained, rel=1e-6)
-    pattern = r"rms [\d.]+ um \(1\.68 % of stroke\), max [\d.]+ um \(.* %\), fit 95\.\d+ %"
+    pattern = (
+        r"rms [\d.]+ um \(1\.68 % of stroke\), max [\d.]+ um \(.* %\) at [\d.]+ s, fit 95\.\d+ %"
+    )
     assert re.fullmatch(pattern, str(none))
 
 

@@ -46,7 +46,8 @@ def test_plays_are_found_without_a_search() -> None:
     # As good as the noise: no other kind could be better.
     assert tried(fit) == ["prandtl-ishlinskii"]
     assert selection_of(fit).fitted_until is not None
-    assert "chosen by the rms after" in fit.summary()
+    until = selection_of(fit).fitted_until
+    assert f"{until:.4g} s, by their rms after it:" in fit.summary()
 
 
 def test_smooth_tips_are_told_from_plays(tmp_path: Path) -> None:

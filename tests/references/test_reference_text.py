@@ -190,3 +190,36 @@ def test_a_missing_file_is_named() -> None:
 def test_three_dots_are_no_decimal_point() -> None:
     with pytest.raises(pt.ParameterError, match="three dots"):
         pt.parse_reference("sine:0.2Hz,0...110um")
+
+
+def test_loops_take_the_text_of_a_reference() -> None:
+    stage = pt.VirtualStage.xu_li_2010(seed=1)
+    loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    text = "sine:0.5Hz,0..100um,4s"
+    run, same = (pt.track(stage, loop, one) for one in (text, pt.parse_reference(text)))
+    assert np.array_equal(run.measured, same.measured)
+    quick: dict[str, Any] = {
+        "dt": 0.02,
+        "limits": (0.0, 75.0),
+        "feedforward": None,
+        "search": pt.TuningSearch(particles=4, iterations=1),
+    }
+    tuned, twin = (pt.tune(stage, one, **quick) for one in (text, [pt.parse_reference(text)]))
+    assert tuned.document() == twin.document()
+    xy, path = pt.XYStage.xu_li_2010(seed=1), "circle:0.5Hz,10um,4s,centre=50/50um"
+    around, twice = (
+        pt.contour(xy, (loop, loop), one) for one in (path, pt.references.parse_path(path))
+    )
+    assert np.array_equal(around.x.measured, twice.x.measured)
+
+
+@pytest.mark.parametrize("wrong", ["sinus:1Hz", "sine:1Hz", "", "missing.csv", 3.0, None])
+def test_a_wrong_text_is_refused_by_the_name_of_the_argument(wrong: Any) -> None:
+    stage = pt.VirtualStage.xu_li_2010(seed=1)
+    loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+    for call in (lambda: pt.track(stage, loop, wrong), lambda: pt.tune(stage, [wrong], dt=0.02)):
+        with pytest.raises(pt.PiezotrackError) as caught:
+            call()
+        if wrong != "missing.csv":
+            assert isinstance(caught.value, pt.ParameterError)
+            assert caught.value.argument == "reference"

@@ -283,18 +283,20 @@ def best_length_unit(stroke_m: float) -> tuple[str, float]:
     return ("nm", 1e9) if size < 1e-6 else ("mm", 1e3)
 
 
-def length_text(metres: float) -> str:
+def length_text(metres: float, digits: int = 4) -> str:
     """Write a length in the unit in which it is easy to read.
 
     Parameters
     ----------
     metres : float
         The length [m].
+    digits : int, optional
+        Significant digits.
 
     Returns
     -------
     str
-        With four digits.
+        Number and unit.
 
     Examples
     --------
@@ -303,11 +305,11 @@ def length_text(metres: float) -> str:
     """
     size = abs(metres)
     if size >= 1.0:
-        return f"{metres:.4g} m"
+        return f"{metres:.{digits}g} m"
     if 0.0 < size < 1e-9:
-        return f"{1e12 * metres:.4g} pm"
+        return f"{1e12 * metres:.{digits}g} pm"
     unit, scale = best_length_unit(metres)
-    return f"{scale * metres:.4g} {unit}"
+    return f"{scale * metres:.{digits}g} {unit}"
 
 
 def of_drive(unit: str, drive: str) -> str:

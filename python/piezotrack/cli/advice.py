@@ -18,6 +18,7 @@ __all__ = ["as_options", "command_at_work"]
 OPTIONS = {
     "count": "plays",
     "dead_zones": "asymmetry",
+    "factor": "decimate",
     "largest_error": "allowed_um",
     "margins.gain": "gain_margin",
     "margins.sensitivity": "sensitivity",
@@ -41,6 +42,9 @@ REMEDIES = [
     (r"\bmissing='(drop|fill)'", r"--missing \1", "--missing"),
     (r"\bcreep=False", "--creep none", "--creep"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
+    # An option of the commands that come after `info`.
+    (r"\bfit\.zeroed\(\)", "--zero", "--zero"),
+    (r"\blog\.decimate\((\w+)\)", r"--decimate \1", "--displacement"),
 ]
 # Where a command has no options for columns, the header of the file has to say it.
 IN_THE_HEADER = [
@@ -94,6 +98,8 @@ def as_options(said: object) -> str:
         text = re.sub(r"; resample= puts it [^;]*", "", text)
     if "--missing" not in known:
         text = re.sub(r"; missing='drop' leaves .*", "", text)
+    if "--zero" not in known:
+        text = re.sub(r"; fit\.zeroed\(\) .*", "", text)
     text = text.replace(", or largest_saturation=0.5 or more", "")
     for python, words, needed in REMEDIES:
         if needed in known:

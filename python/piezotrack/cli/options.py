@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Columns",
     "ControlInterval",
+    "Decimate",
     "DisplacementColumn",
     "DriveColumn",
     "Duration",
@@ -40,6 +41,7 @@ __all__ = [
     "Seconds",
     "TimeColumn",
     "Units",
+    "Zero",
     "can_be_folder",
     "can_be_written",
     "column",
@@ -88,6 +90,14 @@ Resample = Annotated[
         help="Put a log with gaps or jitter on even times, at this interval in s; default not."
     ),
 ]
+Decimate = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N",
+        help="Every Nth sample of the log, after a low-pass filter without lag over all signals; "
+        "for one sampled far above what moves (see `info`), not for steps. Default all.",
+    ),
+]
 MissingOption = Annotated[
     Literal["drop", "fill"] | None,
     typer.Option(
@@ -107,6 +117,14 @@ Duration = Annotated[
 Period = Annotated[
     float | None,
     typer.Option(help="Time in s after which a reference from a file repeats; default never."),
+]
+Zero = Annotated[
+    bool,
+    typer.Option(
+        "--zero",
+        help="Displacements from the beginning of the record on: less what its sensor reads there, "
+        "before the drive moves. Default as recorded.",
+    ),
 ]
 Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that exist.")]
@@ -134,10 +152,12 @@ class Columns:
         displacement: str | None,
         unit: list[str] | None,
         dt: float | None,
+        decimate: int | None = None,
+        zero: bool = False,
     ) -> None:
         self.time, self.drive, self.displacement = map(column, (time, drive, displacement))
         self.units = {column(name) or name: text for name, text in pairs("--unit", unit)}
-        self.dt = dt
+        self.dt, self.decimate, self.zero = dt, decimate, zero
 
     def read(
         self,
@@ -149,7 +169,7 @@ class Columns:
         """Read a log with these columns."""
         from ..data.reader import read
 
-        return read(
+        log = read(
             file,
             time=self.time,
             drive=self.drive,
@@ -160,6 +180,10 @@ class Columns:
             hold=hold,
             missing=missing,
         )
+        if self.decimate not in (None, 1):
+            with of_file(file):
+                log = log.decimate(self.decimate)
+        return log.zeroed() if self.zero else log
 
     def read_drive(self, file: Path) -> Dataset:
         """Read a drive with these columns."""

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json as json_text
+import os
+import re
+import sys
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ParameterError
@@ -13,7 +17,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
-__all__ = ["Output"]
+__all__ = ["Output", "print_words", "wrapped"]
+
+# Columns that lines have at most and at least where they are wrapped, and what is before a note.
+WIDEST, NARROWEST, NOTE = 100, 40, "note  "
+# Rows of tables and commands stay as they are.
+KEPT = re.compile(r" *(?:piezotrack |.*\S {2,}\S)")
 
 
 class Output:
@@ -79,5 +88,79 @@ class Output:
             whole = json_ready({**document, "written": [str(path) for path in files]})
             print(json_text.dumps(whole, indent=2, allow_nan=False))
         elif not self._quiet:
-            print(as_options(words))
+            print_words(words)
             list_files(files)
+
+
+def print_words(words: str) -> None:
+    """Print lines for a person, in the options of the command and as wide as the terminal.
+
+    Where the output is no terminal, and ``COLUMNS`` is not set, each line stays whole.
+
+    Parameters
+    ----------
+    words : str
+        One line or several.
+    """
+    print(wrapped(as_options(words), _columns()))
+
+
+def wrapped(words: str, columns: int | None) -> str:
+    """Break the sentences among some lines, indented from the second line on.
+
+    Parameters
+    ----------
+    words : str
+        One line or several; rows of tables and commands are not broken.
+    columns : int or None
+        Width of the terminal; None where lines stay whole.
+
+    Returns
+    -------
+    str
+        With at most 100 columns where a sentence has blanks to break at.
+
+    Examples
+    --------
+    >>> print(wrapped("note  the drive goes from 0 to 90 V, that of the record to 75 V", 40))
+    note  the drive goes from 0 to 90 V,
+          that of the record to 75 V
+    """
+    if columns is None:
+        return words
+    width = min(max(columns, NARROWEST), WIDEST)
+    return "\n".join(line for text in words.split("\n") for line in _broken(text, width))
+
+
+def _broken(line: str, width: int) -> list[str]:
+    head, indent = "", re.match(" *", line)[0] + "  "  # type: ignore[index]
+    if line.startswith(NOTE):
+        head, indent = NOTE, " " * len(NOTE)
+    elif KEPT.match(line):
+        return [line]
+    if len(line) <= width:
+        return [line]
+    # A number stays with its unit.
+    joined = re.sub(r"(?<=\d) (?=%|\w)", "\0", line[len(head) :])
+    lines = textwrap.wrap(
+        joined,
+        width,
+        initial_indent=head,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+        expand_tabs=False,
+        replace_whitespace=False,
+    )
+    return [one.replace("\0", " ") for one in lines]
+
+
+def _columns() -> int | None:
+    """Width of the terminal; None where the output is none."""
+    given = os.environ.get("COLUMNS", "")
+    if given.isdecimal() and int(given) > 0:
+        return int(given)
+    try:
+        return os.get_terminal_size(sys.stdout.fileno()).columns or None
+    except (OSError, ValueError, AttributeError):
+        return None

@@ -41,6 +41,9 @@ __all__ = ["Dataset", "Hold"]
 
 Hold = Literal["foh", "zoh"]
 
+# Share of its range by which a drive has left its first sample.
+STANDS = 2e-3
+
 
 class Dataset(Viewed):
     """An evenly sampled record of one axis, in seconds, volts and metres.
@@ -151,9 +154,12 @@ class Dataset(Viewed):
         self._columns, self._column_units = further_columns(columns, column_units, self._u)
         self._hold, self._drive_unit, self._source = hold, drive_unit, source
         self._notes = (*map(str, notes), *filled.notes)
-        self._start = 0
+        self._start, self._zero = 0, 0.0
         self._sha256: str | None = None
         self._far: Mask | None = None
+        # Samples that `interpolate` put between the measured ones, and the interval of these.
+        self._inserted: Mask | None = None
+        self._measured_dt: float | None = None
 
     @classmethod
     def from_frame(
@@ -308,16 +314,48 @@ class Dataset(Viewed):
     def left_out(self) -> Mask | None:
         """Samples in the window whose displacement does not count; None where all count.
 
-        There `y` is on the straight line between the readings beside.
+        There `y` is on the straight line between the readings beside, or interpolated.
         """
         return None if self._left_out is None else self._left_out[self._start :]
 
     @property
+    def inserted(self) -> Mask | None:
+        """Samples in the window that `interpolate` put between the measured ones; None without any.
+
+        They are among those of `left_out`.
+        """
+        return None if self._inserted is None else self._inserted[self._start :]
+
+    def at_readings(self, values: Array) -> Array:
+        """Return the entries of values in the window without those at `inserted` samples."""
+        return values if self.inserted is None else values[~self.inserted]
+
+    @property
+    def measured(self) -> Dataset:
+        """The record without the samples of `inserted`; the record itself without any."""
+        if self._inserted is None:
+            return self
+        kept = ~self._inserted
+        part = self._part(0, self._u.size, start=int(kept[: self._start].sum()))
+        part._select(kept)
+        part._dt, part._inserted, part._measured_dt = self.measured_dt, None, None
+        if part._left_out is not None and not part._left_out.any():
+            part._left_out = None
+        return part
+
+    @property
     def far(self) -> Mask:
         """Samples in the window that are single readings far off, shape (n,)."""
+        return self._far_of_all[self._start :]
+
+    @property
+    def _far_of_all(self) -> Mask:
+        """Single readings far off, those of the warm-up too."""
         if self._far is None:
-            self._far = far_readings(self._u, self._y)
-        return self._far[self._start :]
+            kept = slice(None) if self._inserted is None else ~self._inserted
+            self._far = np.zeros(self._u.size, dtype=np.bool_)
+            self._far[kept] = far_readings(self._u[kept], self._y[kept])
+        return self._far
 
     @property
     def far_notes(self) -> list[str]:
@@ -364,7 +402,7 @@ class Dataset(Viewed):
             return self
         part = self._part(0, self._u.size, start=self._start)
         # Those of the warm-up, which does not count, have no effect.
-        apart = far_readings(self._u, self._y) if self._far is None else self._far
+        apart = self._far_of_all
         mask = apart if self._left_out is None else self._left_out | apart
         part._recorded = self._y if self._recorded is None else self._recorded
         part._y, part._left_out = signal_of("y", bridged(self._y, mask)), mask
@@ -374,6 +412,11 @@ class Dataset(Viewed):
     def dt(self) -> float:
         """Sampling interval [s]."""
         return self._dt
+
+    @property
+    def measured_dt(self) -> float:
+        """Interval of the measured samples [s]: of an interpolated record longer than `dt`."""
+        return self._dt if self._measured_dt is None else self._measured_dt
 
     @property
     def hold(self) -> Hold:
@@ -416,6 +459,11 @@ class Dataset(Viewed):
         return self._part(0, self._u.size, start=0)
 
     @property
+    def zero(self) -> float:
+        """Displacement of the source that `zeroed` subtracted [m]; 0 where nothing was."""
+        return self._zero
+
+    @property
     def duration(self) -> float:
         """Length of the window [s]: its number of samples times `dt`."""
         return len(self) * self._dt
@@ -429,14 +477,16 @@ class Dataset(Viewed):
     def sha256(self) -> str:
         """Fingerprint of the numbers, 64 hexadecimal digits.
 
-        SHA-256 over little-endian float64: `dt`, all of `full.u`, all of `full.recorded`, `warmup`.
+        SHA-256 over little-endian float64: `dt`, all of `full.u`, all of `full.recorded`, `warmup`;
+        of an interpolated record also `measured_dt`.
         """
         if self._sha256 is None:
             import hashlib
 
             digest = hashlib.sha256()
             recorded = self._y if self._recorded is None else self._recorded
-            for part in (self._dt, self._u, recorded, self._start):
+            measured = () if self._measured_dt is None else (self._measured_dt,)
+            for part in (self._dt, self._u, recorded, self._start, *measured):
                 digest.update(np.asarray(part, dtype="<f8").tobytes())
             self._sha256 = digest.hexdigest()
         return self._sha256
@@ -513,6 +563,8 @@ class Dataset(Viewed):
         if whole is not self:
             less._notes += tuple(self.far_notes)
         less._left_out = thinned(self._left_out, factor, first)
+        less._inserted = thinned(self._inserted, factor, first)
+        less._measured_dt = None if less._inserted is None else self._measured_dt
         return less._part(0, len(less), start=self._start // factor)
 
     def interpolate(self, factor: int) -> Dataset:
@@ -524,6 +576,9 @@ class Dataset(Viewed):
         Nyquist frequency (80 dB), and keep their samples. Only for a drive that the low-pass
         before the log, or the signal itself, kept below that; not for steps.
 
+        `identify` does it by itself where it lowers the residual. What is inserted moves the stage,
+        but is no reading: it does not count in a fit, a score or an estimate of the noise.
+
         Parameters
         ----------
         factor : int
@@ -533,7 +588,7 @@ class Dataset(Viewed):
         -------
         Dataset
             The window begins with the same sample as before; the drive goes straight from sample
-            to sample.
+            to sample. `inserted` has the new samples, `measured` is the record without them.
 
         Raises
         ------
@@ -559,13 +614,51 @@ class Dataset(Viewed):
         fine = whole._resampled(*at_higher_rate(self._t, self._dt, factor))
         if whole is not self:
             fine._notes += tuple(self.far_notes)
-        if self._left_out is not None:
-            fine._left_out = np.repeat(self._left_out, factor)[: fine._u.size]
+        fine._inserted = np.ones(fine._u.size, dtype=np.bool_)
+        fine._inserted[::factor] = False if self._inserted is None else self._inserted
+        fine._left_out = fine._inserted.copy()
+        if whole._left_out is not None:
+            fine._left_out[::factor] = whole._left_out
+        fine._measured_dt = self.measured_dt
         return fine._part(0, len(fine), start=self._start * factor)
+
+    def zeroed(self) -> Dataset:
+        """Return the record with displacements that count from its beginning.
+
+        What is subtracted is the median of the readings, warm-up included, up to where the drive
+        first leaves its first sample by 0.2 % of its range; the first reading where it moves at
+        once. Readings that do not count are left aside.
+
+        Returns
+        -------
+        Dataset
+            The record, whose `zero` is what was subtracted. A window and its record have the same.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = np.r_[np.zeros(100), 30.0 - 30.0 * np.cos(np.arange(5000) / 500.0)]
+        >>> log = pt.Dataset(u=u, y=1e-6 * u - 120e-6, dt=0.005).zeroed()
+        >>> f"{1e6 * log.y[0]:.1f} um, {1e6 * log.zero:.1f} um"
+        '0.0 um, -120.0 um'
+        """
+        begun = np.abs(self._u - self._u[0]) > STANDS * float(np.ptp(self._u))
+        still = slice(0, max(1, int(np.argmax(begun))) if begun.any() else self._u.size)
+        counts = ~self._far_of_all[still]
+        if self._left_out is not None:
+            counts &= ~self._left_out[still]
+        # On a straight line where no reading counts.
+        zero = float(np.median(self._y[still][counts] if counts.any() else self._y[still]))
+        part = self._part(0, self._u.size, start=self._start)
+        part._y, part._zero = signal_of("y", self._y - zero), self._zero + zero
+        if self._recorded is not None:
+            part._recorded = signal_of("y", self._recorded - zero, finite=False)
+        return part
 
     def _resampled(self, times: Array, change: Callable[[Array], Array]) -> Dataset:
         """Change all signals and the warm-up; the drive then goes straight between samples."""
-        return Dataset(
+        changed = Dataset(
             u=change(self._u),
             y=change(self._y),
             t=times,
@@ -576,23 +669,49 @@ class Dataset(Viewed):
             source=self._source,
             notes=self._notes,
         )
+        changed._zero = self._zero
+        return changed
+
+    def _preceded(self, u: float) -> Dataset:
+        """Put a sample with a drive of `u` before all others; its displacement does not count."""
+        longer = Dataset(
+            u=np.concatenate(([u], self._u)),
+            y=np.concatenate((self._y[:1], self._y)),
+            dt=self._dt,
+            hold=self._hold,
+            drive_unit=self._drive_unit,
+            source=self._source,
+        )
+        for name in ("_left_out", "_inserted"):
+            if (mask := getattr(self, name)) is not None:
+                setattr(longer, name, np.concatenate(([True], mask)))
+        longer._measured_dt = self._measured_dt
+        return longer._part(0, longer._u.size, start=self._start + 1)
 
     def _samples(self, start: float | None, stop: float | None) -> tuple[int, int]:
         """Turn the bounds of a window [s] into indices of the arrays."""
         first, last = window_samples(self.t, self._dt, start, stop)
+        if self.inserted is not None and not self.inserted[first:last].all():
+            # A window begins with a measured sample.
+            first += int(np.argmin(self.inserted[first:last]))
         return self._start + first, self._start + last
 
     def _part(self, first: int, stop: int, start: int) -> Dataset:
         """Keep samples `first` to `stop` of the arrays and begin the window at `start`."""
         part = object.__new__(type(self))
         part.__dict__.update(self.__dict__)
-        part._t, part._u, part._y = (a[first:stop] for a in (self._t, self._u, self._y))
-        part._columns = {name: a[first:stop] for name, a in self._columns.items()}
-        for name in ("_recorded", "_left_out", "_far"):
-            kept = getattr(self, name)
-            setattr(part, name, None if kept is None else kept[first:stop])
+        part._select(slice(first, stop))
         part._start, part._sha256 = start, None
         return part
+
+    def _select(self, kept: slice | Mask) -> None:
+        """Keep some of the samples of a new record."""
+        for name in ("_t", "_u", "_y", "_recorded", "_left_out", "_far", "_inserted"):
+            values = getattr(self, name)
+            setattr(self, name, None if values is None else values[kept])
+        self._columns = {name: a[kept] for name, a in self._columns.items()}
+        for array in (self._t, self._u, self._y, *self._columns.values()):
+            array.setflags(write=False)
 
     def __repr__(self) -> str:
         unit, scale = best_length_unit(self.stroke)
@@ -601,6 +720,8 @@ class Dataset(Viewed):
             f"{self.duration:.6g} s at {1.0 / self.dt:.6g} Hz",
             f"stroke {self.stroke * scale:.3g} {unit}",
         ]
+        if self._inserted is not None:
+            parts.append(f"interpolated from {1.0 / self.measured_dt:.6g} Hz")
         if self.warmup:
             parts.append(f"warm-up {self.warmup} samples")
         return f"Dataset({', '.join(parts)})"

@@ -107,8 +107,8 @@ def even_times(t: Array, interval: float) -> Array:
         raise ParameterError(
             "resample",
             f"{interval:g} s",
-            f"{shortest:.3g} s to {longest:.6g} s, than which half of the intervals of the log "
-            "are not shorter; decimate() goes further",
+            f"{shortest:.3g} s to {longest:.6g} s, the median interval of the log; a lower rate "
+            "is that of log.decimate(N)",
         )
     count = math.floor(length / interval * (1.0 + 1e-12)) + 1
     times: Array = np.minimum(t[0] + interval * np.arange(count), t[-1])

@@ -36,7 +36,8 @@ def connect(address: str) -> Device:
     address : str
         ``SCHEME:REST``; other packages add schemes by the entry point ``piezotrack.devices``.
         ``virtual:`` is the stage of Xu and Li 2010, ``virtual:MODEL.json`` an
-        identified one; ``gcs://HOST[:PORT][/AXIS]``: a controller that speaks GCS, port 50000 and
+        identified one in the displacements of its record, ``virtual:MODEL.json?zero`` in those that
+        begin at 0; ``gcs://HOST[:PORT][/AXIS]``: a controller that speaks GCS, port 50000 and
         axis 1 where they are not given; ``?limits=0..100V``, ``factor=1V`` and ``timeout=5s`` as
         of `GcsDevice`; ``ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V`` as
         `NiDevice`; ``scpi://HOST:PORT?unit=um&limits=0..75V`` as `ScpiDevice`.

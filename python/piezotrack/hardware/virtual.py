@@ -173,20 +173,28 @@ class VirtualDevice:
 def from_address(
     host: str | None, port: int | None, path: str, options: Mapping[str, str]
 ) -> VirtualDevice:
-    """Make the virtual stage of an address: ``virtual:`` or ``virtual:MODEL.json``."""
-    if host or port or options:
-        raise ParameterError("device", "a virtual stage", "virtual: or virtual:MODEL.json")
-    stage, limits = virtual_stage(path or None)
+    """Make the virtual stage of an address: ``virtual:`` or ``virtual:MODEL.json[?zero]``."""
+    known = options in ({}, {"zero": ""}) if path else not options
+    if host or port or not known:
+        raise ParameterError(
+            "device", "a virtual stage", "virtual:, virtual:MODEL.json or virtual:MODEL.json?zero"
+        )
+    stage, limits = virtual_stage(path or None, zeroed=bool(options))
     return VirtualDevice(stage, limits=limits)
 
 
-def virtual_stage(path: str | Path | None) -> tuple[VirtualStage, tuple[float, float] | None]:
+def virtual_stage(
+    path: str | Path | None, *, zeroed: bool = False
+) -> tuple[VirtualStage, tuple[float, float] | None]:
     """Return the stage of a model file with the range of its drive [V], or that of the paper.
 
     Parameters
     ----------
     path : str, pathlib.Path or None
         Model file; None for the stage of Xu and Li 2010.
+    zeroed : bool, optional
+        Whether the sensor reads 0 at the beginning of the record identified, in place of what it
+        read then; see `IdentifiedModel.zeroed`.
 
     Returns
     -------
@@ -209,4 +217,4 @@ def virtual_stage(path: str | Path | None) -> tuple[VirtualStage, tuple[float, f
         raise ParameterError(
             f"device {path}", f"driven in {known.drive_unit}", "a stage that a voltage drives"
         )
-    return VirtualStage.of(known), known.drive_range
+    return VirtualStage.of(known.zeroed() if zeroed else known), known.drive_range

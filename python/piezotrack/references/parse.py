@@ -9,21 +9,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .._support.arguments import expect
 from .._support.messages import quoted
 from .._support.units import Unit, known_units, lookup
 from ..errors import ParameterError
 from .paths import circle, lissajous, raster, spiral
-from .reference import read_reference
+from .reference import Reference, read_reference
 from .waveforms import chirp, multisine, sine, staircase, triangle
-from .xy_reference import HOME, read_path
+from .xy_reference import HOME, XYReference, read_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from .reference import Reference
-    from .xy_reference import XYReference
-
-__all__ = ["parse_path", "parse_reference"]
+__all__ = ["parse_path", "parse_reference", "path_of", "reference_of"]
 
 # Length of a periodic reference where none is given, in periods.
 PERIODS = 4.0
@@ -165,6 +163,51 @@ def parse_reference(text: str, *, duration: float | None = None) -> Reference:
     """
     reference: Reference = made_from_text("reference", text, KINDS, read_reference, duration)
     return reference
+
+
+def reference_of(
+    given: Reference | str | os.PathLike[str],
+    *,
+    duration: float | None = None,
+    period: float | None = None,
+) -> Reference:
+    """Return a reference, or make it from a text or a file.
+
+    Parameters
+    ----------
+    given : Reference, str or path-like
+        A reference, a text as of `parse_reference`, or a file as of `read_reference`.
+    duration : float, optional
+        Length [s] of a text without one, or of a file.
+    period : float, optional
+        Time after which a file repeats [s].
+
+    Returns
+    -------
+    Reference
+        `given` itself where it is one.
+
+    Raises
+    ------
+    ParameterError
+        It is none of these, or `period` is given with a text; ``argument`` is ``"reference"``.
+    DataError
+        The file cannot be read or used.
+
+    Examples
+    --------
+    >>> reference_of("triangle:1Hz,5..42um").duration
+    4.0
+    """
+    if not isinstance(given, str | os.PathLike):
+        expect("reference", given, Reference, "pt.Reference or a text, as 'sine:0.2Hz,0..110um'")
+        return given
+    text = os.fspath(given)
+    if os.path.isfile(text):
+        return read_reference(text, duration=duration, period=period)
+    if period is not None:
+        raise ParameterError("period", "for a reference from a file", f"none with {quoted(text)}")
+    return parse_reference(text, duration=duration)
 
 
 def made_from_text(
@@ -386,3 +429,52 @@ def parse_path(
         others["centre"] = centre
     path: XYReference = made_from_text("path", text, PATHS, read_path, duration, **others)
     return path
+
+
+def path_of(
+    given: XYReference | str | os.PathLike[str],
+    *,
+    duration: float | None = None,
+    period: float | None = None,
+    dt: float | None = None,
+    centre: tuple[float, float] | None = None,
+    origin: tuple[float, float] | None = HOME,
+) -> XYReference:
+    """Return a path, or make it from a text or a file.
+
+    Parameters
+    ----------
+    given : XYReference, str or path-like
+        A path, a text as of `parse_path`, or a file as of `read_path`.
+    duration, centre, origin : optional
+        As of `parse_path`; `centre` has no effect on a file.
+    period, dt : float, optional
+        As of `read_path`, of a file [s].
+
+    Returns
+    -------
+    XYReference
+        `given` itself where it is one.
+
+    Raises
+    ------
+    ParameterError
+        It is none of these, or `period` or `dt` is given with a text; ``argument`` is ``"path"``.
+    DataError
+        The file cannot be read or used.
+
+    Examples
+    --------
+    >>> path_of("circle:0.1Hz,10um,centre=50/50um").duration
+    30.0
+    """
+    if not isinstance(given, str | os.PathLike):
+        expect("path", given, XYReference, "pt.XYReference or a text, as 'circle:0.1Hz,10um'")
+        return given
+    text = os.fspath(given)
+    if os.path.isfile(text):
+        return read_path(text, duration=duration, period=period, dt=dt, origin=origin)
+    for name, value in (("period", period), ("dt", dt)):
+        if value is not None:
+            raise ParameterError(name, "for a path from a file", f"none with {quoted(text)}")
+    return parse_path(text, duration=duration, centre=centre, origin=origin)

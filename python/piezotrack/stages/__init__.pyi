@@ -40,6 +40,7 @@ from .relays.duhem import DuhemStage as DuhemStage
 from .relays.duhem import DuhemState as DuhemState
 from .relays.preisach import PreisachStage as PreisachStage
 from .relays.preisach import PreisachState as PreisachState
+from .slow_loop import SlowLoop as SlowLoop
 from .virtual import VirtualResponse as VirtualResponse
 from .virtual import VirtualStage as VirtualStage
 from .xy import XYLog as XYLog

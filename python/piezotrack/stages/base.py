@@ -378,7 +378,7 @@ def _stage_text(stage: Stage) -> str:
         attributes of the stage, and ``dataclasses.asdict(stage)`` has them in a dict.
     """
     parts = _with_mass(stage) if hasattr(stage, "stiffness") else _at_the_input(stage)
-    if creep := len(stage.creep_times):  # type: ignore[attr-defined]
+    if creep := int(np.count_nonzero(stage.creep_weights)):  # type: ignore[attr-defined]
         parts.append(_count(creep, "creep time"))
     return f"{type(stage).__name__}({', '.join(parts)})"
 

@@ -23,7 +23,7 @@ DeviceAddress = Annotated[
     typer.Option(
         metavar="ADDRESS",
         help="Device: gcs://HOST, scpi://HOST:PORT?unit=um&limits=0..75V, "
-        "ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V, virtual: or virtual:MODEL.json.",
+        "ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V, virtual: or virtual:MODEL.json[?zero].",
     ),
 ]
 Rest = Annotated[

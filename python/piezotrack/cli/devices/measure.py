@@ -50,6 +50,7 @@ def measure_command(
     from ...data.log_file import format_to_write
     from ...hardware.excitations import parse_drive
     from ...hardware.measuring import measure
+    from ..output import print_words
 
     format_to_write(out)
     if out.exists() and not overwrite:
@@ -65,5 +66,5 @@ def measure_command(
     print(f"{volts!r}, held between samples, from {first:.4g} s to {last:.4g} s")
     print(f"  piezotrack identify {out} --hold zoh --window {first:.4g}:{last:.4g}")
     for note in log.notes:
-        print(f"note  {note}")
+        print_words(f"note  {note}")
     list_files([written])

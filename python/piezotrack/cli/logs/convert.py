@@ -6,6 +6,7 @@ from ...errors import ParameterError
 from ..error_messages import report_errors
 from ..options import (
     Columns,
+    Decimate,
     DisplacementColumn,
     DriveColumn,
     Interval,
@@ -17,6 +18,7 @@ from ..options import (
     Resample,
     TimeColumn,
     Units,
+    Zero,
     list_files,
 )
 
@@ -34,6 +36,8 @@ def convert_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    decimate: Decimate = None,
+    zero: Zero = False,
     missing: MissingOption = None,
     quiet: Quiet = False,
 ) -> None:
@@ -43,15 +47,17 @@ def convert_command(
     to the last bit.
     """
     from ...data.log_file import format_to_write
-    from ..advice import as_options
+    from ..output import print_words
 
     format_to_write(out)
     if out.exists() and not overwrite:
         raise ParameterError(f"{out} exists: expected --overwrite, or another name")
-    log = Columns(time, drive, displacement, unit, dt).read(file, "foh", resample, missing)
+    log = Columns(time, drive, displacement, unit, dt, decimate, zero).read(
+        file, "foh", resample, missing
+    )
     written = log.save(out)
     if not quiet:
         print(f"{len(log)} samples, {log.duration:.6g} s at {1.0 / log.dt:.6g} Hz")
         for note in log.notes:
-            print(as_options(f"note  {note}"))
+            print_words(f"note  {note}")
         list_files([written])

@@ -38,7 +38,7 @@ def info_command(
     """
     from ..._support.files.writing import json_ready
     from ...data.checks.log_info import info
-    from ..advice import as_options
+    from ..output import print_words
 
     columns = Columns(time, drive, displacement, unit, dt)
     found = info(
@@ -53,4 +53,4 @@ def info_command(
     if json:
         print(json_text.dumps(json_ready(found.document()), indent=2, allow_nan=False))
     else:
-        print(as_options(found.summary()))
+        print_words(found.summary())

@@ -228,21 +228,16 @@ def _path(
     place: dict[str, Any],
 ) -> XYReference:
     """Read the path from a file if the text names one, else parse the text."""
-    from ...references.parse import parse_path
-    from ...references.xy_reference import read_path
+    from ...references.parse import path_of
 
-    if Path(text).is_file():
-        try:
-            own = {key: place[key] for key in place if key == "origin"}
-            return read_path(text, duration=duration, period=period, dt=dt, **own)
-        except DataError as error:
-            # Here --time and --dt do not belong to the path.
-            words = str(error).replace("name it with time=, or give the", "expected time_s, or the")
-            raise DataError(words.replace("interval with dt=", "interval with --path-dt")) from None
-    for option, value in (("--period", period), ("--path-dt", dt)):
-        if value is not None:
-            raise ParameterError(option, "for a path from a file", f"none with {text}")
-    return parse_path(text, duration=duration, **place)
+    if dt is not None and not Path(text).is_file():
+        raise ParameterError("--path-dt", "for a path from a file", f"none with {text}")
+    try:
+        return path_of(text, duration=duration, period=period, dt=dt, **place)
+    except DataError as error:
+        # Here --time and --dt do not belong to the path.
+        words = str(error).replace("name it with time=, or give the", "expected time_s, or the")
+        raise DataError(words.replace("interval with dt=", "interval with --path-dt")) from None
 
 
 def _changed(stage: XYStage, lag: float | None, cross_talk: str | None) -> XYStage:

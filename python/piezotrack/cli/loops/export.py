@@ -20,7 +20,6 @@ from ..options import (
     refuse_without_effect,
 )
 from ..output import Output
-from .track import parsed_reference
 
 if TYPE_CHECKING:
     import numpy as np
@@ -82,6 +81,7 @@ def export_command(
     """Write a controller as C, coefficients or FMU."""
     from ...control.controller.load import load_controller
     from ...export.write import export_controller, export_files
+    from ...references.parse import reference_of
 
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     chosen = controller.stem.replace("-", "_") if name is None else name
@@ -97,7 +97,9 @@ def export_command(
         refuse_without_effect(context, ("duration", "period"), "without --reference")
     known = load_controller(controller)
     volts = None if table is None else _table(table, known.dt, known.drive_unit)
-    motion = None if reference is None else parsed_reference(reference, duration, period)
+    motion = None
+    if reference is not None:
+        motion = reference_of(reference, duration=duration, period=period)
     result.will_write(names)
     with of_file(controller):
         done = export_controller(

@@ -19,6 +19,7 @@ from ..options import (
     Overwrite,
     Period,
     Quiet,
+    Zero,
     number,
     refuse_without_effect,
 )
@@ -37,13 +38,13 @@ from .loop_options import (
     StageFile,
     Td,
     Ti,
-    driven_by_voltage,
+    known_model,
     noise_metres,
     refuse_of_other_stage,
     simulated,
     unit_of,
 )
-from .track import BeyondReach, parsed_reference
+from .track import BeyondReach  # noqa: TC001 - read by typer
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -90,6 +91,7 @@ def learn_command(
     overwrite: Overwrite = False,
     dt: Interval = None,
     limits: Limits = None,
+    zero: Zero = False,
     feedforward: Feedforward = True,
     feedback: Feedback = None,
     kp: Kp = None,
@@ -131,14 +133,14 @@ def learn_command(
     from ...control.controller.controller import Controller
     from ...control.learning.learn import learn
     from ...control.timing import Timing
-    from ...identification.fitted.model_file import load
+    from ...references.parse import reference_of
 
     own = stage != PAPER
     settings = Loop(own, dt, limits, feedback, kp, ti, td)
     _check_options(context, settings, device, noise_nm)
     _check_file(out)
-    known = load(model) if own else driven_by_voltage(load(model), model)
-    desired = parsed_reference(reference, duration, period)
+    known = known_model(model, zero=zero, paper=not own)
+    desired = reference_of(reference, duration=duration, period=period)
     result = Output(out.parent, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write([out.name, *(picture_files(out.stem) if picture else [])])
     plays: AbstractContextManager[VirtualStage | Device] = (

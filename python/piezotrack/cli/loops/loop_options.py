@@ -43,11 +43,13 @@ __all__ = [
     "check_stage",
     "drive_notes",
     "driven_by_voltage",
+    "known_model",
     "noise_metres",
     "refuse_of_other_stage",
     "simulated",
     "small_margins",
     "unit_of",
+    "zero_words",
 ]
 
 # Names of the stages that can be simulated: the model itself, and that of the paper.
@@ -261,6 +263,19 @@ def driven_by_voltage(model: IdentifiedModel, file: Path) -> IdentifiedModel:
     return model
 
 
+def known_model(file: Path, *, zero: bool, paper: bool = False) -> IdentifiedModel:
+    """Load a model, in the displacements of its record or in those that begin at 0."""
+    from ...identification.fitted.model_file import load
+
+    model = driven_by_voltage(load(file), file) if paper else load(file)
+    return model.zeroed() if zero else model
+
+
+def zero_words(model: IdentifiedModel) -> str:
+    """Say from where displacements count, where not as recorded."""
+    return f", zeroed: {1e6 * model.zero:.4g} um subtracted" if model.zero else ""
+
+
 def unit_of(own: bool, model: IdentifiedModel | None) -> str:
     """Return the unit of the drive of the loop, SI."""
     return model.drive_unit if own and model is not None else "V"
@@ -308,12 +323,11 @@ def simulated(
     """Make the stage of `StageFile`, with the noise [m] of a sensor and a bandwidth [Hz]."""
     from pathlib import Path
 
-    from ...identification.fitted.model_file import load
     from ...stages.virtual import VirtualStage
 
     if stage == PAPER:
         return VirtualStage.xu_li_2010(seed=seed)
-    other = known if stage is None else load(Path(stage))
+    other = known if stage is None else known_model(Path(stage), zero=known.zero != 0.0)
     if other.drive_unit != known.drive_unit:
         one, two = (shown_unit(model.drive_unit)[0] for model in (other, known))
         raise ParameterError(

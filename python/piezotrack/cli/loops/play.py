@@ -3,21 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..devices.connection import DeviceAddress, Rest, connected
 from ..error_messages import report_errors
-from ..options import Duration, Json, Out, Overwrite, Period, Quiet  # noqa: TC001, typer reads it
+from ..options import (
+    Duration,
+    Json,
+    Out,
+    Overwrite,
+    Period,
+    Quiet,
+    Zero,
+    refuse_without_effect,
+)
 from ..output import Output
-from .track import parsed_reference
+from .loop_options import known_model
+
+if TYPE_CHECKING:
+    from ...control.controller.controller import Controller
+    from ...stages.inverse import Inverse
 
 __all__ = ["play_command"]
 
 
 @report_errors
 def play_command(
+    context: typer.Context,
     file: Annotated[
         Path,
         typer.Argument(
@@ -34,6 +48,7 @@ def play_command(
         float | None,
         typer.Option(help="Sampling rate of the inverse of a model in Hz.", show_default=False),
     ] = None,
+    zero: Zero = False,
     duration: Duration = None,
     period: Period = None,
     rest: Rest = None,
@@ -44,10 +59,14 @@ def play_command(
     from ..._support.files.writing import picture_files
     from ...control.controller.load import load_controller
     from ...control.on_device.playing import play
-    from ...identification.fitted.model_file import load
+    from ...references.parse import reference_of
 
-    forward = load_controller(file) if rate is None else load(file).inverse()
-    desired = parsed_reference(reference, duration, period)
+    if rate is None:
+        refuse_without_effect(context, ["zero"], "without --rate: a controller has its zero")
+        forward: Controller | Inverse = load_controller(file)
+    else:
+        forward = known_model(file, zero=zero).inverse()
+    desired = reference_of(reference, duration=duration, period=period)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     with connected(device) as used:

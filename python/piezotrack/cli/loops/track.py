@@ -20,6 +20,7 @@ from ..options import (
     Overwrite,
     Period,
     Quiet,
+    Zero,
     refuse_without_effect,
 )
 from ..output import Output
@@ -41,12 +42,13 @@ from .loop_options import (
     Ti,
     check_stage,
     drive_notes,
-    driven_by_voltage,
+    known_model,
     noise_metres,
     refuse_of_other_stage,
     simulated,
     small_margins,
     unit_of,
+    zero_words,
 )
 
 if TYPE_CHECKING:
@@ -56,7 +58,6 @@ if TYPE_CHECKING:
 __all__ = [
     "BeyondReach",
     "feedforward_command",
-    "parsed_reference",
     "track_command",
 ]
 
@@ -92,6 +93,7 @@ def track_command(
     overwrite: Overwrite = False,
     dt: Interval = None,
     limits: Limits = None,
+    zero: Zero = False,
     feedforward: Feedforward = True,
     online: Online = False,
     feedback: Feedback = None,
@@ -154,11 +156,11 @@ def track_command(
     from ...control.loop.stability import check_loop
     from ...control.running.track import track
     from ...control.timing import Timing
-    from ...identification.fitted.model_file import load
+    from ...references.parse import reference_of
 
     if device is not None:
         refuse_without_effect(context, SIMULATED, "with --device")
-        desired = parsed_reference(reference, duration, period)
+        desired = reference_of(reference, duration=duration, period=period)
         result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
         _on_device(model, device, desired, result, beyond_reach=beyond_reach, unstable=unstable)
         return
@@ -175,8 +177,8 @@ def track_command(
         refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
     if own and not (noise_nm or jitter):
         refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
-    known = load(model) if own else driven_by_voltage(load(model), model)
-    desired = parsed_reference(reference, duration, period)
+    known = known_model(model, zero=zero, paper=not own)
+    desired = reference_of(reference, duration=duration, period=period)
     playback: Literal["table", "online"] = "online" if online else "table"
     loop = Controller(
         dt=settings.dt(known, desired),
@@ -191,8 +193,8 @@ def track_command(
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     free = {"beyond_reach": beyond_reach, "unstable": unstable}
     run = track(plant, loop, desired, timing=Timing(delay=delay, jitter=jitter), **free)
-    name = f"stage: {model.name}" if own else "stage: the virtual stage of Xu and Li 2010"
-    lines = [name, run.summary()]
+    name = f"{model.name}{zero_words(known)}" if own else "the virtual stage of Xu and Li 2010"
+    lines = [f"stage: {name}", run.summary()]
     notes = drive_notes(known, run)
     lines += [f"note  {note}" for note in notes]
     if loop.feedback is not None or loop.repetitive is not None:
@@ -211,7 +213,7 @@ def track_command(
 
 # Options of a simulation, or of a controller that a file has.
 SIMULATED = (
-    *("stage", "dt", "limits", "feedforward", "online", "feedback", "kp", "ti", "td", "tt"),
+    *("stage", "dt", "limits", "zero", "feedforward", "online", "feedback", "kp", "ti", "td", "tt"),
     *("repetitive", "kq", "tq", "delay", "jitter", "noise_nm", "bandwidth", "seed"),
 )
 
@@ -267,6 +269,7 @@ def feedforward_command(
         ),
     ] = None,
     limits: Limits = None,
+    zero: Zero = False,
     online: Online = False,
     duration: Duration = None,
     period: Period = None,
@@ -286,10 +289,10 @@ def feedforward_command(
     from ...control.loop.preconditions import check_within_reach
     from ...control.plant import plant_of
     from ...control.views.tracking_plot import plot_feedforward
-    from ...identification.fitted.model_file import load
+    from ...references.parse import reference_of
 
-    known = load(model)
-    desired = parsed_reference(reference, duration, period)
+    known = known_model(model, zero=zero)
+    desired = reference_of(reference, duration=duration, period=period)
     settings = Loop(True, dt, limits, None, None, None, None)
     interval = settings.dt(known, desired)
     # A file without a record has no range.
@@ -317,7 +320,7 @@ def feedforward_command(
         written += save_figures({"feedforward": picture}, folder)
     notes = known.extrapolation_notes(voltage, interval)
     lines = [
-        f"{desired!r} at {1.0 / interval:g} Hz; {how}",
+        f"{desired!r} at {1.0 / interval:g} Hz; {how}{zero_words(known)}",
         f"{voltage.size} samples, {what} from {shown.min():.4g} to {shown.max():.4g} {unit}",
         *(f"note  {note}" for note in notes),
     ]
@@ -333,15 +336,3 @@ def feedforward_command(
         "notes": notes,
     }
     result.show("\n".join(lines), document, written)
-
-
-def parsed_reference(text: str, duration: float | None, period: float | None) -> Reference:
-    """Read the reference from a file if the text names one, else parse the text."""
-    from ...references.parse import parse_reference
-    from ...references.reference import read_reference
-
-    if Path(text).is_file():
-        return read_reference(text, duration=duration, period=period)
-    if period is not None:
-        raise ParameterError("--period", "for a reference from a file", f"none with {text}")
-    return parse_reference(text, duration=duration)

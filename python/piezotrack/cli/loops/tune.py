@@ -10,10 +10,28 @@ import typer
 
 from ...errors import ParameterError
 from ..error_messages import report_errors
-from ..options import Duration, Json, ModelFile, Out, Overwrite, Period, Quiet  # noqa: TC001 - read by typer
+from ..options import (  # noqa: TC001 - read by typer
+    Duration,
+    Json,
+    ModelFile,
+    Out,
+    Overwrite,
+    Period,
+    Quiet,
+    Zero,
+)
 from ..output import Output
-from .loop_options import AmplifierBandwidth, Interval, Limits, Loop, LoopDelay, Noise, noise_metres
-from .track import parsed_reference
+from .loop_options import (
+    AmplifierBandwidth,
+    Interval,
+    Limits,
+    Loop,
+    LoopDelay,
+    Noise,
+    known_model,
+    noise_metres,
+    zero_words,
+)
 
 __all__ = ["tune_command"]
 
@@ -34,6 +52,7 @@ def tune_command(
     overwrite: Overwrite = False,
     dt: Interval = None,
     limits: Limits = None,
+    zero: Zero = False,
     parts: Annotated[
         str | None,
         typer.Option(
@@ -88,7 +107,7 @@ def tune_command(
     from ...control.tuning.margins import Margins, Spread
     from ...control.tuning.tune import tune
     from ...control.tuning.tuned import picture_name
-    from ...identification.fitted.model_file import load
+    from ...references.parse import reference_of
     from ...stages.virtual import VirtualStage
 
     _within("--gain-margin", gain_margin, 1.0, math.inf, "a factor above 1")
@@ -99,8 +118,8 @@ def tune_command(
     _within("--delay-spread", delay_spread, 0.0, math.inf, "seconds, 0 or above")
     margins = Margins(gain=gain_margin, phase=math.radians(phase_margin), sensitivity=sensitivity)
     spread = Spread(delay=(0.0, delay_spread), mode=0.01 * mode_spread, gain=0.01 * gain_spread)
-    known = load(model)
-    desired = [parsed_reference(text, duration, period) for text in reference or ()]
+    known = known_model(model, zero=zero)
+    desired = [reference_of(text, duration=duration, period=period) for text in reference or ()]
     settings = Loop(True, dt, limits, None, None, None, None)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     pictures = [name for i in range(len(desired)) for name in picture_files(picture_name(i))]
@@ -121,7 +140,7 @@ def tune_command(
         timing=Timing(delay=delay),
         search=TuningSearch(seed=seed),
     )
-    result.show(str(tuned), tuned.document(), tuned.save(out))
+    result.show(f"{tuned}{zero_words(known)}", tuned.document(), tuned.save(out))
 
 
 def _within(option: str, value: float, low: float, high: float, expected: str) -> None:

@@ -12,6 +12,7 @@ from ...errors import DataError, ParameterError
 from ..error_messages import report_errors
 from ..options import (
     Columns,
+    Decimate,
     DisplacementColumn,
     DriveColumn,
     HoldOption,
@@ -87,6 +88,7 @@ def benchmark_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    decimate: Decimate = None,
     hold: HoldOption = "foh",
     json: Json = False,
     quiet: Quiet = False,
@@ -97,11 +99,11 @@ def benchmark_command(
     if not files:
         refuse_without_effect(context, ("train", "test"), "without a FILE")
     if not files and listed is None:
-        columns = ("time", "drive", "displacement", "unit", "dt", "resample", "hold")
+        columns = ("time", "drive", "displacement", "unit", "dt", "resample", "decimate", "hold")
         refuse_without_effect(context, columns, "without a FILE or --list")
     result = Output(out, overwrite=True, json=json, quiet=quiet)
     can_be_folder(out)
-    reading = Columns(time, drive, displacement, unit, dt)
+    reading = Columns(time, drive, displacement, unit, dt, decimate)
 
     def read(file: Path) -> Dataset:
         return reading.read(file, hold, resample)

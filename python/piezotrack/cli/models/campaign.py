@@ -14,6 +14,7 @@ from ..error_messages import report_errors
 from ..interruption import acknowledge_interrupt
 from ..options import (
     Columns,
+    Decimate,
     DisplacementColumn,
     DriveColumn,
     HoldOption,
@@ -25,6 +26,7 @@ from ..options import (
     Seconds,
     TimeColumn,
     Units,
+    Zero,
     can_be_folder,
     refuse_without_effect,
     windowed,
@@ -100,6 +102,8 @@ def campaign_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    decimate: Decimate = None,
+    zero: Zero = False,
     missing: MissingOption = None,
     hold: HoldOption = "foh",
     free: Free = None,
@@ -171,7 +175,7 @@ def campaign_command(
         kind: {"model": kind, **of_record, **options.arguments_of(kind)} for kind in kinds.names
     }
     numbers = _seeds(seeds)
-    columns = Columns(time, drive, displacement, unit, dt)
+    columns = Columns(time, drive, displacement, unit, dt, decimate, zero)
     logs = {
         title: windowed(columns.read(file, hold, resample, missing), file, "--window", window)
         for title, file in _titles(files).items()

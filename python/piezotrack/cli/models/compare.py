@@ -11,6 +11,7 @@ from ...stages.model_info import LISTED
 from ..error_messages import report_errors
 from ..options import (
     Columns,
+    Decimate,
     DisplacementColumn,
     DriveColumn,
     HoldOption,
@@ -24,6 +25,7 @@ from ..options import (
     Resample,
     TimeColumn,
     Units,
+    Zero,
     of_file,
     refuse_without_effect,
     seconds,
@@ -66,6 +68,8 @@ def compare_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    decimate: Decimate = None,
+    zero: Zero = False,
     missing: MissingOption = None,
     hold: HoldOption = "foh",
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
@@ -87,7 +91,7 @@ def compare_command(
         )
 
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    columns = Columns(time, drive, displacement, unit, dt)
+    columns = Columns(time, drive, displacement, unit, dt, decimate, zero)
     log = columns.read(file, hold, resample, missing)
     fitted = None if train is None else seconds("--train", train)
     judged = None if test is None else seconds("--test", test)

@@ -14,6 +14,7 @@ from ..error_messages import report_errors
 from ..interruption import acknowledge_interrupt
 from ..options import (
     Columns,
+    Decimate,
     DisplacementColumn,
     DriveColumn,
     HoldOption,
@@ -27,6 +28,7 @@ from ..options import (
     Seconds,
     TimeColumn,
     Units,
+    Zero,
     of_file,
     windowed,
 )
@@ -90,6 +92,8 @@ def identify_command(
     unit: Units = None,
     dt: Interval = None,
     resample: Resample = None,
+    decimate: Decimate = None,
+    zero: Zero = False,
     missing: MissingOption = None,
     hold: HoldOption = "foh",
     free: Free = None,
@@ -135,6 +139,8 @@ def identify_command(
     quiet: Quiet = False,
 ) -> None:
     """Identify models of a stage from one log or several."""
+    from ...identification.fitted.score import share_fitted
+
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
@@ -161,7 +167,7 @@ def identify_command(
     check_each_log(len(files), delay=delay, drift=drift, history=history, weight=weight)
     if checkpoint is not None and len(kinds.names) > 1:
         raise ParameterError("--checkpoint", "given with several models", "one")
-    columns = Columns(time, drive, displacement, unit, dt)
+    columns = Columns(time, drive, displacement, unit, dt, decimate, zero)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")
     windows = each_of("--window", window, len(files))
@@ -197,9 +203,10 @@ def identify_command(
         (out / _partial(kind)).unlink(missing_ok=True)
         words.append(fit.summary())
         if second is not None and score is not None:
-            own = ", with an offset of its own" if offset else ""
+            own = ", with an offset of its own" if offset and score.fitted_share < 1.0 else ""
             span = f"from {second.t[0]:.6g} to {second.t[-1]:.6g} s"
-            words.append(f"on {second.source} {span}, not fitted{own}: {score}")
+            fitted = share_fitted(score.fitted_share)
+            words.append(f"on {second.source} {span}, {fitted}{own}: {score}")
             words += [f"note  {note}" for note in score.notes]
         documents.append({**fit.document(), "notes": fit.notes})
     result.show("\n\n".join(words), {"models": documents}, written)
@@ -253,6 +260,8 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
         "window_s": [float(second.t[0]), float(second.t[-1])],
         "rms": {"value": score.rms, "unit": "m"},
         "max_error": {"value": score.max_error, "unit": "m"},
+        "max_error_time": {"value": score.max_error_time, "unit": "s"},
+        "fitted_share": score.fitted_share,
         "fit_percent": {"value": score.fit_percent, "unit": "%"},
         "offset": {"value": score.offset, "unit": "m"},
     }

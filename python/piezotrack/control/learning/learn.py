@@ -15,6 +15,7 @@ from ..._support.units import drive_word, shown_unit
 from ...errors import DataError, DeviceError, Interrupted, ParameterError
 from ...hardware.device import Device
 from ...hardware.measuring import rest_of
+from ...references.parse import reference_of
 from ..controller.controller import Controller
 from ..loop.preconditions import check_drive_unit
 from ..loop.run import Run
@@ -178,7 +179,7 @@ class Learning(Result):
 
 def learn(
     stage: Plant | IdentifiedModel | Device,
-    reference: Reference,
+    reference: Reference | str,
     controller: Controller,
     *,
     model: Plant | IdentifiedModel | None = None,
@@ -213,8 +214,9 @@ def learn(
     stage : Stage, VirtualStage, IdentifiedModel or Device
         The plant. Each trial begins where its experiments begin, with noise of its own; on a device
         it begins and ends at `rest`, and the controller has no feedback.
-    reference : Reference
-        The reference; of one that repeats, a settled period is learnt, however long it lasts.
+    reference : Reference or str
+        The reference, or its text as of `track`; of one that repeats, a settled period is
+        learnt, however long it lasts.
     controller : Controller
         As of `control.IterativeLearning`.
     model : Stage, VirtualStage or IdentifiedModel, optional
@@ -269,6 +271,7 @@ def learn(
     >>> found.errors[found.best] < 0.1 * found.errors[0]
     np.True_
     """
+    reference = reference_of(reference)
     known = _model_of(stage, controller) if model is None else model
     timing = given_or("timing", timing, Timing())
     home = _rest_on(stage, controller, rest, timing)

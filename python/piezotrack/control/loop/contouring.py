@@ -16,6 +16,7 @@ from ..._support.files.writing import write_result
 from ..._support.statistics import ErrorStatistics
 from ..._support.units import drive_word, shown_unit
 from ...errors import ParameterError
+from ...references.parse import path_of
 from ...references.xy_reference import XYReference, square_matrix
 from ...stages.xy import XYStage
 from ..controller.controller import Controller
@@ -322,7 +323,7 @@ def spread_text(spread: ErrorStatistics) -> str:
 def contour(
     stage: XYStage,
     controllers: Sequence[Controller],
-    path: XYReference,
+    path: XYReference | str,
     *,
     decoupling: ArrayLike | None = None,
     timing: Timing | None = None,
@@ -342,8 +343,9 @@ def contour(
         The plant.
     controllers : (Controller, Controller)
         Of x and y, with the same sampling interval.
-    path : XYReference
-        The path, as ``pt.circle(...)``.
+    path : XYReference or str
+        The path, as ``pt.circle(...)``; or a text or a file, as the command line takes it:
+        ``"circle:0.1Hz,10um"``.
     decoupling : array_like, shape (2, 2), optional
         Cross-talk as of `identification.identify_cross_talk`: the feedforward follows the path
         times its inverse, which cancels the cross-talk.
@@ -382,7 +384,7 @@ def contour(
     True
     """
     expect("stage", stage, XYStage, "pt.XYStage")
-    expect("path", path, XYReference, "pt.XYReference")
+    path = path_of(path)
     both = _two(controllers)
     substeps = _core.as_count("substeps", substeps)
     free = {

@@ -130,12 +130,15 @@ def check_within_reach(
     ):
         if past > slack:
             k = int(np.flatnonzero(samples.x == value)[0])
+            # What would be within reach from another zero.
+            shifted = float(np.ptp(samples.x)) <= top - bottom + slack and stage.sensor.offset
             raise ParameterError(
                 "reference",
                 f"{1e6 * value:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um beyond "
                 f"{1e6 * edge:.4g} um",
                 f"{1e6 * bottom:.4g} to {1e6 * top:.4g} um on the sensor, which this stage "
-                f"reaches from {scale * low:g} to {scale * high:g} {unit}, or beyond_reach=True",
+                f"reaches from {scale * low:g} to {scale * high:g} {unit}, or beyond_reach=True"
+                + ("; fit.zeroed() counts from the beginning of its record" if shifted else ""),
             )
     # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
     k = int(np.argmax(samples.x))

@@ -20,7 +20,7 @@ from ...hardware.measuring import (
     rest_of,
 )
 from ...hardware.safe_end import led_back
-from ...references.reference import Reference
+from ...references.parse import reference_of
 from ...stages.inverse import Inverse
 from ..controller.controller import Controller
 from ..loop.run import Run
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...hardware.device import Device
+    from ...references.reference import Reference
 
     Array = NDArray[np.float64]
 
@@ -123,7 +124,7 @@ def played_on(
 def play(
     device: Device,
     controller: Controller | Inverse,
-    reference: Reference,
+    reference: Reference | str,
     *,
     rate: float | None = None,
     rest: float | None = None,
@@ -142,8 +143,8 @@ def play(
         The device.
     controller : Controller or Inverse
         A controller with feedforward alone, or an inverse, as ``fit.inverse()``.
-    reference : Reference
-        The reference.
+    reference : Reference or str
+        The reference, or its text as of `track`.
     rate : float, optional
         Sampling rate of an inverse [Hz]; a controller has its own.
     rest : float, optional
@@ -178,7 +179,7 @@ def play(
     28 nm
     """
     check_device(device)
-    expect("reference", reference, Reference, "pt.Reference")
+    reference = reference_of(reference)
     if isinstance(controller, Inverse):
         if rate is None:
             raise ParameterError("rate", "not given", "the sampling rate of an inverse, Hz")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ... import _core
 from ...errors import ParameterError
 from ...hardware.device import Device
-from ...references.reference import Reference
+from ...references.parse import reference_of
 from ..controller.controller import Controller
 from ..loop.preconditions import check_drive_unit
 from ..loop.run import Run
@@ -16,6 +16,7 @@ from ..plant import plant_of, timing_on
 
 if TYPE_CHECKING:
     from ...identification.fitted.identified_model import IdentifiedModel
+    from ...references.reference import Reference
     from ..loop.tracking import Tracking
     from ..plant import Plant
     from ..timing import Timing
@@ -26,7 +27,7 @@ __all__ = ["track"]
 def track(
     stage: Plant | IdentifiedModel | Device,
     controller: Controller,
-    reference: Reference,
+    reference: Reference | str,
     *,
     timing: Timing | None = None,
     substeps: int = 10,
@@ -49,8 +50,9 @@ def track(
         offset and delay of an `IdentifiedModel` are included in the displacement.
     controller : Controller
         The controller.
-    reference : Reference
-        The reference, as ``pt.sine(...)``.
+    reference : Reference or str
+        The reference, as ``pt.sine(...)``; or a text or a file, as the command line takes it:
+        ``"sine:0.2Hz,0..100um,10s"``.
     timing : Timing, optional
         Delay and jitter of the loop, and the voltages before the run.
     substeps : int, optional
@@ -89,12 +91,9 @@ def track(
     >>> print(f"{run.metrics.phase_lag:.2f} rad")
     0.06 rad
     """
-    for name, value, kind in (
-        ("controller", controller, Controller),
-        ("reference", reference, Reference),
-    ):
-        if not isinstance(value, kind):
-            raise ParameterError(name, type(value).__name__, f"pt.{kind.__name__}")
+    if not isinstance(controller, Controller):
+        raise ParameterError("controller", type(controller).__name__, "pt.Controller")
+    reference = reference_of(reference)
     if isinstance(stage, Device):
         if timing is not None or substeps != 10:
             raise ParameterError(

@@ -13,6 +13,7 @@ from ..._support.arrays import check_dt
 from ..._support.messages import quoted
 from ...errors import ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
+from ...references.parse import path_of, reference_of
 from ...references.reference import Reference
 from ...references.xy_reference import XYReference
 from ...stages.base import Stage
@@ -209,9 +210,8 @@ def _stages(stage: Any) -> list[Plant | IdentifiedModel]:
 
 def _references(reference: Any, kind: type) -> list[Any]:
     given = [] if reference is None else reference
-    references = list(given) if isinstance(given, Sequence) else [given]
-    for one in references:
-        expect("reference", one, kind, f"pt.{kind.__name__}")
+    several = isinstance(given, Sequence) and not isinstance(given, str)
+    references = [_made(one, kind) for one in (given if several else [given])]
     if kind is XYReference and not references:
         raise ParameterError(
             "reference",
@@ -219,6 +219,19 @@ def _references(reference: Any, kind: type) -> list[Any]:
             "a path; gains from margins alone are tuned for one axis after the other",
         )
     return references
+
+
+def _made(one: Any, kind: type) -> Any:
+    """Return a reference or a path, or make it of a text."""
+    if not isinstance(one, str):
+        expect("reference", one, kind, f"pt.{kind.__name__} or a text")
+        return one
+    if kind is Reference:
+        return reference_of(one)
+    try:
+        return path_of(one)
+    except ParameterError as error:
+        raise error.of("reference", argument="reference") from None
 
 
 def _check_has_integral_part(law: str, references: list[Reference]) -> None:

@@ -53,7 +53,12 @@ class TuneOptions(TypedDict, total=False):
 
 def tune(
     stage: Plant | IdentifiedModel | Sequence[Plant | IdentifiedModel] | XYStage,
-    reference: Reference | Sequence[Reference] | XYReference | Sequence[XYReference] | None = None,
+    reference: Reference
+    | XYReference
+    | str
+    | Sequence[Reference | str]
+    | Sequence[XYReference | str]
+    | None = None,
     *,
     dt: float | Sequence[float] | None = None,
     limits: tuple[float, float] | None = None,
@@ -87,8 +92,9 @@ def tune(
     stage : Stage, VirtualStage, IdentifiedModel, or a sequence of them; or XYStage
         The first is simulated; the margins hold for all of them. A stage model and an identified
         one have no noise and no amplifier: ``pt.VirtualStage.of`` gives them both.
-    reference : Reference or sequence of Reference, optional
-        Motions along which the error counts; of an XY stage paths, as ``pt.circle(...)``.
+    reference : Reference, str or sequence of them, optional
+        Motions along which the error counts; of an XY stage paths, as ``pt.circle(...)``. A text or
+        a file is taken as by the command line: ``"triangle:1Hz,5..42um"``.
     dt : float or sequence of float, optional
         Sampling interval [s], or those that are allowed; by default that of an identified model's
         record.

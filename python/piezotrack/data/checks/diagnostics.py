@@ -98,6 +98,7 @@ def record_warnings(data: Dataset) -> list[str]:
     a stroke of 40 m is not that of a nanopositioner: is the unit of the displacement right? It \
 would be 40 um if it is 1e6 too large, as um taken as m
     """
+    data = data.measured
     if np.ptp(data.u) == 0.0 or np.ptp(data.y) == 0.0:
         return [*data.notes]
     notes = [*data.notes, *data.far_notes]

@@ -29,6 +29,7 @@ from .drive_features import (
     reversals_text,
     time_features,
 )
+from .sampling_rate import sampling_notes
 
 if TYPE_CHECKING:
     import os
@@ -296,6 +297,10 @@ def info(
     found, stroke = None, None if y is None else float(np.ptp(y))
     if t is not None and u is not None:
         found = drive_features(t, u, y, _si(roles["drive"]))
+    # Of a log that is read as it is: another has no even rate, or not yet.
+    spare: list[str] = []
+    if times is not None and u is not None and y is not None and not problems:
+        spare = sampling_notes(u, times.interval)
     sentences: list[str] = []
     if times is not None and found is not None:
         sentences = drive_notes(times, found, stroke)
@@ -311,7 +316,7 @@ def info(
         drive=found,
         stroke=stroke,
         determines=tuple(sentences),
-        notes=(*log.columns.notes, *lost, *_of_signals(t, u, y)),
+        notes=(*log.columns.notes, *lost, *_of_signals(t, u, y), *spare),
     )
 
 

@@ -25,6 +25,8 @@ def dataset_html(data: Dataset) -> str:
         ("stroke", f"{scale * data.stroke:.4g} {unit}"),
         ("warm-up", f"{data.warmup} samples"),
     ]
+    if data.zero:
+        rows.append(("zero", f"{scale * data.zero:.4g} {unit} subtracted"))
     rows += [(name, data.column_units.get(name, "")) for name in data.columns]
     rows += [("note", note) for note in data.notes]
     return words(f"Dataset {data.source or ''}".rstrip(), rows).html()

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from ... import _core
 from ..._support.statistics import sample_noise
 from ...data.checks import diagnostics
 from ...data.checks.connections import unusual_connection
@@ -157,6 +158,43 @@ class Identification(IdentifiedModel):
         """Motion of the model on each record."""
         return [self.simulate(data, offset=one.offset) for data, one in self._fitted]
 
+    @cached_property
+    def noises(self) -> tuple[float, ...]:
+        """Noise of each record from sample to sample [m], as far as the model does not explain it.
+
+        0 for a record of fewer than 16 samples.
+        """
+        pairs = zip(self._fitted, self._responses, strict=True)
+        return tuple(
+            min(sample_noise(data.measured.y), sample_noise(data.at_readings(data.y - run.x)))
+            for (data, _), run in pairs
+        )
+
+    @property
+    def autocorrelations(self) -> tuple[float, ...]:
+        """Correlation of neighbouring residuals of each record, as `ModelScore.autocorrelation`."""
+        return tuple(
+            float(_core.residual(data.counted(data.y - run.x), 0)[2])
+            for (data, _), run in zip(self._fitted, self._responses, strict=True)
+        )
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        document = super().document()
+        if len(self.records) == 1:
+            document["fit"] = document.get("fit", {}) | {
+                "max_error": {"value": self.fitted.max_error, "unit": "m"},
+                "max_error_time": {"value": self.fitted.max_error_time, "unit": "s"},
+                "noise": {"value": self.noises[0], "unit": "m"},
+            }
+        return document
+
     @property
     def notes(self) -> list[str]:
         """Warnings about the record and the fit, one sentence each."""
@@ -167,6 +205,11 @@ class Identification(IdentifiedModel):
             source = f" ({data.source})" if data.source else ""
             which = f"record {i + 1}{source}: " if several else ""
             notes += [which + note for note in self._notes_on(data, record, run)]
+        if self.interpolation:
+            notes.append(
+                "the drive is fast for its sampling rate: it is interpolated to "
+                f"{self.interpolation} times the rate, which fits better than straight lines"
+            )
         if info.drive_unit == "N" and unit != "N":
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
         rates = [_frequency(data) for data, _ in self._fitted]
@@ -183,9 +226,10 @@ class Identification(IdentifiedModel):
 
     def _notes_on(self, data: Dataset, record: FittedRecord, run: Response) -> list[str]:
         """Warnings about one of the records and the fit there."""
-        notes, rest = diagnostics.record_warnings(data), data.y - run.x
-        if data.left_out is not None:
-            rest[data.left_out] = data.counted(rest).mean()
+        notes, rest, measured = diagnostics.record_warnings(data), data.y - run.x, data.measured
+        rest = data.at_readings(rest)
+        if measured.left_out is not None:
+            rest[measured.left_out] = measured.counted(rest).mean()
         if record.cost_percent > 5.0:
             notes.append(
                 "the model does not fit this record: the residual is "
@@ -199,15 +243,15 @@ class Identification(IdentifiedModel):
             )
         notes += drift_notes(record.drift, record.stroke)
         notes += self.model._notes(lambda: run)
-        lines = hum_lines(rest, data.u, data.y, data.dt)
+        lines = hum_lines(rest, measured.u, measured.y, measured.dt)
         notes += hum_notes(lines)
         if self.selection:
             # A mode moves from sample to sample as noise does; what is left of it hardly does.
             without_hum = (
                 math.sqrt(max(record.cost**2 - power_of(lines), 0.0)) if lines else record.cost
             )
-            notes += above_noise(without_hum, min(sample_noise(data.y), sample_noise(rest)))
-        return notes + first_samples(rest, data)
+            notes += above_noise(without_hum, min(sample_noise(measured.y), sample_noise(rest)))
+        return notes + first_samples(rest, measured)
 
     @property
     def success(self) -> bool:

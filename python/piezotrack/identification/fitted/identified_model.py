@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -13,8 +14,11 @@ from ..._support.arguments import expect
 from ..._support.arrays import LARGEST, check_dt, signal_of
 from ..._support.display.result import Result
 from ..._support.files.writing import write_document
+from ...data.checks.fast_drive import CURVED, is_fast
 from ...data.dataset import Dataset
+from ...data.resampling import interpolated
 from ...errors import ParameterError, ShapeError
+from ...stages.slow_loop import SlowLoop
 from .delayed_reading import delayed_reading
 from .drift import drift_entry
 from .fitted_record import record_entries, record_of
@@ -82,6 +86,9 @@ class IdentifiedModel(Result):
         What each of several records identified has of its own; `offset`, `delay` and `start` are
         those of the first, and `stroke` is the largest. Of one record: a result has it alone, a
         model from a file has none.
+    interpolation : int or None
+        Samples to which each of a record whose drive is fast for its sampling rate is interpolated,
+        as in the fit: band-limited. None where the drive goes straight from sample to sample.
     details : mapping
         Other entries of the model file: fit, provenance.
     """
@@ -103,6 +110,7 @@ class IdentifiedModel(Result):
     start: Start | None = None
     drift: Drift | None = None
     records: tuple[FittedRecord, ...] = ()
+    interpolation: int | None = None
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
@@ -122,10 +130,51 @@ class IdentifiedModel(Result):
         return drive_unit_of(self.details, self.model.info)
 
     @property
+    def zero(self) -> float:
+        """Reading of the record identified that `zeroed` subtracted [m]; 0 where nothing was."""
+        return float((self.details.get("zero") or {}).get("value", 0.0))
+
+    def zeroed(self) -> IdentifiedModel:
+        """Return the model with displacements that count from the beginning of its record.
+
+        A reference, a feedforward and a virtual stage of a model are in the displacements that its
+        record has, as from -120 to -74 um. Those of this one begin at 0, as those of
+        ``log.zeroed()``: its offset is less by the reading at the first sample of the record, drift
+        aside, or at rest without drive where the file has no start.
+
+        Returns
+        -------
+        IdentifiedModel
+            Of the same stage; `zero` is what was subtracted.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> u = 30.0 - 30.0 * np.cos(np.arange(3000) / 100.0)
+        >>> log = pt.Dataset(u=u, y=1e-6 * u - 120e-6, dt=0.005)
+        >>> fit = pt.identify(log, "prandtl-ishlinskii")
+        >>> print(f"{1e6 * fit.offset:.0f} um, {abs(1e6 * fit.zeroed().offset):.0f} um")
+        -120 um, 0 um
+        """
+        begun = 0.0 if self.start is None else float(self.start.state.x)
+        zero = self.offset + begun
+        kept = {one.name: getattr(self, one.name) for one in fields(IdentifiedModel)}
+        subtracted = {"zero": {"value": self.zero + zero, "unit": "m"}}
+        kept |= {"offset": -begun, "records": (), "details": {**self.details, **subtracted}}
+        return IdentifiedModel(**kept)
+
+    @property
     def dt(self) -> float | None:
         """Sampling interval of the record identified [s]; None if the file has none."""
         found = self._record.get("dt_s")
         return None if found is None else float(found)
+
+    @cached_property
+    def slow_loop(self) -> SlowLoop | None:
+        """Slow loop over the range of the drive identified; None if the file has no range."""
+        reached = self.drive_range
+        return None if reached is None else SlowLoop.of(self.model, *reached)
 
     @property
     def _record(self) -> Mapping[str, Any]:
@@ -332,19 +381,26 @@ class IdentifiedModel(Result):
                 verb="has",
             )
         state = self._begins(data, history, initial)
-        start = data.warmup
-        run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = delayed_reading(self.model.info, run, self._delay_on(data))[start:] + self._drift_on(
-            data
-        )
-        signals = {
-            signal.name: value[start:]
+        run, x, kept = self._motion(data, state)
+        signals: dict[str, Any] = {
+            signal.name: value[kept]
             for signal in fields(run)
             if isinstance(value := getattr(run, signal.name), np.ndarray)
         }
         signals |= {"t": data.t, "u": data.u, "x": x}
         windowed: Response = replace(run, **signals)
         return windowed
+
+    def _motion(self, data: Dataset, state: StageState) -> tuple[Response, Array, slice]:
+        """Response, displacement as it is read in the window, and which samples are in that."""
+        u, dt, factor = data.full.u, data.dt, 1
+        if self.interpolation and data.inserted is None and is_fast(data, CURVED):
+            factor = self.interpolation
+            u, dt = interpolated(u, factor), dt / factor
+        run = self.model.simulate(u, dt, hold=data.hold, initial=state)
+        kept = slice(factor * data.warmup, None, factor)
+        x = delayed_reading(self.model.info, run, self._delay_on(data))[kept]
+        return run, x + self._drift_on(data), kept
 
     def _added(
         self, data: Dataset, x: Array, offset: float | Literal["own"]
@@ -390,15 +446,31 @@ class IdentifiedModel(Result):
         x = self._run(data, history, initial).x
         drift, shift = self._added(data, x, offset)
         error = data.counted(data.y - x - drift - shift)
-        own = self._own(data)
+        own, largest = self._own(data), int(np.abs(error).argmax())
         return Score(
             rms=float(np.sqrt(np.mean(error**2))),
-            max_error=float(np.abs(error).max()),
+            max_error=float(abs(error[largest])),
             stroke=self.stroke if own is None else own.stroke,
             offset=shift,
             spread=float(np.std(data.counted(data.y))),
             notes=(*self.extrapolation_notes(data.u, data.dt), *data.far_notes),
+            max_error_time=float(data.counted(data.t)[largest]),
+            fitted_share=self._fitted_share(data),
         )
+
+    def _fitted_share(self, data: Dataset) -> float:
+        """Share of the samples of a record that the model was fitted to."""
+        fitted = np.zeros(len(data))
+        known = [(one.start, one.origin) for one in self.records] or [(self.start, self._record)]
+        for start, origin in known:
+            if origin.get("sha256") == data.sha256:
+                return 1.0
+            count, first = origin.get("samples"), origin.get("warmup_samples")
+            if isinstance(count, int) and isinstance(first, int) and same_beginning(start, data):
+                # Windows of one record are counted from its first sample.
+                first -= data.warmup
+                fitted[max(first, 0) : max(first + count, 0)] = 1.0
+        return float(np.mean(data.counted(fitted)))
 
     def start_on(self, data: Dataset, *, history: History | None = None) -> Start:
         """Where a record begins: the state of the stage at its first sample.
@@ -435,10 +507,7 @@ class IdentifiedModel(Result):
 
     def _residual(self, data: Dataset, state: StageState) -> Array:
         """Measured less simulated displacement in the window, without offset [m]."""
-        run = self.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        x = delayed_reading(self.model.info, run, self._delay_on(data))[
-            data.warmup :
-        ] + self._drift_on(data)
+        x = self._motion(data, state)[1]
         rest: Array = data.y - x - self._added(data, x, "own")[0]
         return rest
 
@@ -587,6 +656,7 @@ class IdentifiedModel(Result):
             "delay": {"value": self.delay, "unit": "s"} | delay,
             "start": start_entry(self.start, self.drive_unit),
             **drift_entry(self.drift),
+            **({"interpolation": self.interpolation} if self.interpolation else {}),
             **record_entries(self.records, self.drive_unit),
             **details,
         }

@@ -52,7 +52,10 @@ OWN = {
     "start",
     "drift",
     "records",
+    "interpolation",
 }
+# Most samples to which one is interpolated.
+MOST_FINER = 100
 # Entries of a parameter that are not details of the fit.
 FACTS = ("value", "unit", "symbol")
 
@@ -109,6 +112,7 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
             start=start_of(document.get("start"), stage_class(info)._state),
             drift=drift_of(document.get("drift")),
             records=_records(document, stage_class(info)._state),
+            interpolation=_interpolation(document.get("interpolation")),
             details={
                 "parameters": {key: _fit_details(entry) for key, entry in parameters.items()},
                 "delay": _fit_details(delay),
@@ -174,6 +178,16 @@ def _records(document: Mapping[str, Any], state: type[StageState]) -> tuple[Fitt
     for i, one in enumerate(records):
         _check_record(f"records[{i}]: data", one.origin)
     return records
+
+
+def _interpolation(entry: object) -> int | None:
+    """Read to how many samples each of a record is interpolated; None where it is not."""
+    if entry is None:
+        return None
+    factor = _core.as_count("interpolation", entry)
+    if not 2 <= factor <= MOST_FINER:
+        raise ParameterError("interpolation", f"{factor}", f"a whole number from 2 to {MOST_FINER}")
+    return factor
 
 
 def _fit_details(entry: Mapping[str, Any]) -> dict[str, Any]:

@@ -229,7 +229,7 @@ def start_notes(start: Start | None, data: Dataset) -> str | None:
         return None
     unit, first = data.drive_unit, float(data.full.u[0])
     other = start.voltage
-    came_from = "another drive" if other is None else drive_text(other, unit)
+    came_from = "" if other is None else f" of {drive_text(other, unit)}"
     if start.history == "rest":
         rest = drive_text(other or 0.0, unit)
         to = drive_text(first, unit)
@@ -237,7 +237,7 @@ def start_notes(start: Start | None, data: Dataset) -> str | None:
     before = {
         "virgin": "never moved before",
         "settled": "settled under the record's own drive",
-        "fit": f"having come from {came_from}, which was fitted",
+        "fit": f"after an earlier drive{came_from}, fitted",
     }[start.history]
     return f"in equilibrium at {drive_text(first, unit)}, {before}"
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from .notes import fit_percent
 
-__all__ = ["Score"]
+__all__ = ["Score", "share_fitted"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Score:
     """Deviation of a simulated displacement from the measured one.
 
@@ -26,6 +26,10 @@ class Score:
         Standard deviation of the measured displacement [m], to which `fit_percent` refers.
     notes : tuple of str
         Remarks on a record that goes beyond the one identified.
+    max_error_time : float
+        When the largest deviation occurs, on the time axis of the record [s].
+    fitted_share : float
+        Share of the samples scored that the model was fitted to, 0 to 1.
     """
 
     rms: float
@@ -34,6 +38,8 @@ class Score:
     offset: float
     spread: float = math.nan
     notes: tuple[str, ...] = ()
+    max_error_time: float = math.nan
+    fitted_share: float = 0.0
 
     @property
     def rms_percent(self) -> float:
@@ -53,9 +59,36 @@ class Score:
         """
         return fit_percent(self.rms, self.spread)
 
+    def __repr__(self) -> str:
+        return f"<Score, {self}>"
+
     def __str__(self) -> str:
         fit = "" if math.isnan(self.spread) else f", fit {self.fit_percent:.4g} %"
+        when = "" if math.isnan(self.max_error_time) else f" at {self.max_error_time:.6g} s"
         return (
             f"rms {1e6 * self.rms:.4g} um ({self.rms_percent:.3g} % of stroke), "
-            f"max {1e6 * self.max_error:.4g} um ({self.max_percent:.3g} %){fit}"
+            f"max {1e6 * self.max_error:.4g} um ({self.max_percent:.3g} %){when}{fit}"
         )
+
+
+def share_fitted(share: float) -> str:
+    """Write which share of a record was fitted.
+
+    Parameters
+    ----------
+    share : float
+        `Score.fitted_share`.
+
+    Returns
+    -------
+    str
+        Such as ``50 % of it fitted``.
+
+    Examples
+    --------
+    >>> share_fitted(0.0), share_fitted(0.5), share_fitted(1.0)
+    ('not fitted', '50 % of it fitted', 'fitted')
+    """
+    if share in (0.0, 1.0):
+        return "fitted" if share else "not fitted"
+    return f"{min(max(100.0 * share, 0.1), 99.9):.3g} % of it fitted"

@@ -31,6 +31,7 @@ __all__ = [
     "Start",
     "begin",
     "checked_history",
+    "fingerprint",
     "same_beginning",
     "start_after",
     "start_at_jump",

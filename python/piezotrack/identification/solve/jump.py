@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...data.dataset import Dataset
 from ...errors import ParameterError
 from ..fitted.model_entries import origin_of, provenance
 from ..fitted.notes import carried_by_first_samples
@@ -16,6 +15,7 @@ from ..fitted.start import GAIN, start_at_jump
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from ...data.dataset import Dataset
     from ..fitted.identification import Identification
     from ..problem.problem import Problem
     from ..problem.records import Record
@@ -99,17 +99,6 @@ def _may_jump(data: Dataset) -> bool:
 
 def _at_rest_before(record: Record) -> Record:
     """Put a sample of 0 V before a record, which is warm-up as its first one is."""
-    data, full = record.data, record.data.full
-    y = full.y if full.left_out is None else np.where(full.left_out, np.nan, full.y)
-    before = Dataset(
-        u=np.concatenate(([0.0], full.u)),
-        y=np.concatenate((full.y[:1], y)),
-        missing="drop",
-        dt=data.dt,
-        hold=data.hold,
-        drive_unit=data.drive_unit,
-        source=data.source,
-    )
-    return replace(
-        record, data=before[float(before.t[max(data.warmup, 1) + 1]) :], history="virgin"
-    )
+    before = record.data._preceded(0.0)
+    begin = before.t[0] if record.data.warmup else before.full.t[2]
+    return replace(record, data=before[float(begin) :], history="virgin")

@@ -136,7 +136,7 @@ class _Beginning:
             if None not in models:
                 up, down = (self.residual(one) for one in models if one is not None)
                 return (down - up) / (ways[0] - ways[1])
-        return np.zeros(len(self.data.t))
+        return np.zeros(self.data.counted(self.data.t).size)
 
 
 def _fitted(model: IdentifiedModel) -> list[_Value]:

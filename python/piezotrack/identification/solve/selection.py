@@ -169,11 +169,16 @@ class _Trials:
         trial = Trial(info.name, info.title, rms, seconds)
         self.found.append(Tried(trial, info, ill, start))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
-        noise = np.array([max(sample_noise(rest.y), repeated(rest)) for rest in self.rests])
+        noise = np.array([noise_of(rest.measured) for rest in self.rests])
         counted = [rest.counted(one) for rest, one in pairs]
         plain = np.array([math.sqrt(float(np.mean(one**2))) for one in counted])
         self.least = min(self.least, float(np.max(plain / np.maximum(noise, 1e-300))))
         return bool(np.all(plain < AS_NOISE * noise)) and all(is_white(one) for one in counted)
+
+
+def noise_of(data: Dataset) -> float:
+    """Return what no model explains [m]: noise between samples, or what does not repeat."""
+    return max(sample_noise(data.y), repeated(data))
 
 
 def judged(data: Dataset, left: Array) -> float:
@@ -191,6 +196,7 @@ def judged(data: Dataset, left: Array) -> float:
     float
         Mean over the classes of blocks, between reversals, that differ in amplitude or rate.
     """
+    left, data = data.at_readings(left), data.measured
     turns = _core.turns(data.u, 0.05 * float(np.ptp(data.u)))
     # Parts of blocks at the ends differ in amplitude by chance.
     blocks = [slice(a, b) for a, b in pairwise(turns)]

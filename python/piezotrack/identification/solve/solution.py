@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..problem.problem import AUTO
+from .between_samples import with_interpolation_tried
 from .one_model import identify_model
 from .selection import identify_best
 
@@ -39,6 +40,10 @@ def solve(problem: Problem, methods: MethodChoice, run: Run) -> Identification:
     ParameterError, DataError, NumericalError, Interrupted
         As for `identify`.
     """
-    if problem.model != AUTO:
-        return identify_model(problem, methods.method(problem.info), run)
-    return identify_best(problem, methods, run)
+
+    def identify(one: Problem) -> Identification:
+        if one.model != AUTO:
+            return identify_model(one, methods.method(one.info), run)
+        return identify_best(one, methods, run)
+
+    return with_interpolation_tried(problem, identify)

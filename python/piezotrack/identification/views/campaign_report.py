@@ -82,6 +82,9 @@ def _row(record: str, model: str, group: list[TaskResult]) -> tuple[str, ...]:
     if not found:
         return record, model, count, "-", "-", "-", "0", "no model"
     costs = [one.rms_percent for one in found]
+    if len(group) == 1:
+        # Nothing to compare it with.
+        return record, model, count, f"{costs[0]:.4g}", "-", "-", "-", found[0].kind or ""
     models = ", ".join(sorted({one.kind or "" for one in found}))
     figures = (f"{value:.4g}" for value in (min(costs), median(costs), max(costs)))
     return record, model, count, *figures, str(_agreeing(group)), models

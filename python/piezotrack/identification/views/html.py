@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from ..._support.display.table import words
+from .quantities import errors_of, of_sensor, of_stage
 from .report import parameter_notes
 
 if TYPE_CHECKING:
@@ -21,17 +22,12 @@ def identification_html(fit: Identification) -> str:
     rows = [
         *(_record(one.data) for one in fit.records if one.data is not None),
         ("model", repr(fit.model)),
-        ("rms error", f"{fit.cost_um:.4g} um, {fit.cost_percent:.3g} % of stroke"),
+        *of_stage(fit),
     ]
     if len(fit.records) == 1:
-        rows += [
-            ("largest error", f"{1e6 * fit.fitted.max_error:.4g} um"),
-            ("offset", f"{1e6 * fit.offset:.4g} um"),
-        ]
-        if fit.delay:
-            rows.append(("delay", f"{1e3 * fit.delay:.4g} ms"))
-        if fit.drift:
-            rows.append(("drift", str(fit.drift)))
+        rows += [*of_sensor(fit.records[0], fit.data), *errors_of(fit, 0)]
+    else:
+        rows.append(("rms error", f"{fit.cost_um:.4g} um, {fit.cost_percent:.3g} % of stroke"))
     rows += [("constraint", _constraint(one)) for one in fit.constraints]
     rows += [("note", note) for note in fit.notes]
     tables = [words(f"Identification: {fit.model.info.title}", rows).html()]

@@ -31,6 +31,7 @@ from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
 from ...stages.motion import Response
 from ..fitted.identification import Identification
+from ..fitted.score import share_fitted
 from ..methods.particle_swarm import ParticleSwarm
 
 if TYPE_CHECKING:
@@ -154,8 +155,9 @@ def plot_time(
         below.axvline(fitted_until, **QUIET)
     above.margins(x=0.0, y=0.05)
     legend_inside(above)
+    t, error = data.at_readings(data.t), data.at_readings(error)
     kept = thinned(error)
-    below.plot(data.t[kept], fine * error[kept], **{**ERROR, "linewidth": 0.8})
+    below.plot(t[kept], fine * error[kept], **{**ERROR, "linewidth": 0.8})
     below.axhline(0.0, **GUIDE)
     below.set(xlabel="time [s]", ylabel=f"error [{small}]")
     rms = float(np.sqrt(np.mean(error**2)))
@@ -382,7 +384,8 @@ def what_was_shown(model: IdentifiedModel, record: Dataset, run: Response) -> st
     """Write model, record, window and error on any record, as the title of its pictures."""
     data = record.without_far_readings()
     rms = 100.0 * float(np.sqrt(np.mean(data.counted(data.y - run.x) ** 2))) / model.stroke
-    fitted = "" if model.fitted_on(record) else ", not fitted"
+    share = model._fitted_share(data)
+    fitted = "" if share == 1.0 else f", {share_fitted(share)}"
     return f"{named(model, record)}{fitted}: {rms:.3g} % of stroke rms"
 
 

@@ -6,19 +6,17 @@ import math
 from typing import TYPE_CHECKING
 
 from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
-from ..._support.units import of_drive, shown_unit
-from ..fitted.notes import start_notes
+from ..._support.units import length_text, of_drive, shown_unit
 from ..methods.descents import Descents
 from ..methods.least_squares import LeastSquares
 from ..methods.particle_swarm import ParticleSwarm
+from .quantities import errors_of, errors_of_file, of_sensor, of_stage, rows
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable
     from pathlib import Path
 
     from ...data.dataset import Dataset
-    from ...stages.model_info import Parameter
     from ..fitted.estimates import Estimate, SearchRun
     from ..fitted.identification import Identification
     from ..fitted.identified_model import IdentifiedModel
@@ -31,6 +29,8 @@ __all__ = [
     "summary_text",
 ]
 
+# Correlation of neighbouring residuals from which on standard deviations are too small.
+CORRELATED = 0.3
 # Units of values that a stage gives in um, and the factor for a drive in metres.
 PER_METRE = {"um/V": ("um/um", 1e-6), "1/V": ("1/um", 1e-6)}
 
@@ -63,9 +63,7 @@ def summary_text(fit: Identification) -> str:
         lines += [f"      {how}", *_runs(search, method)]
     lines += _trials(fit)
     lines += [*(f"note  {note}" for note in fit.notes), ""]
-    return "\n".join(
-        [*lines, *(_estimates(fit) if searched else _values(fit, fit.model.info.parameters))]
-    )
+    return "\n".join([*lines, *(_estimates(fit) if searched else _values(fit))])
 
 
 def model_text(model: IdentifiedModel) -> str:
@@ -83,71 +81,48 @@ def model_text(model: IdentifiedModel) -> str:
     """
     info, origin = model.model.info, model.details.get("provenance") or {}
     source = (origin.get("data") or {}).get("source") or "a record"
-    lines = [f"{info.title}: stage identified from {source}, stroke {1e6 * model.stroke:.4g} um"]
-    if model.offset_fitted:
-        lines.append(f"      offset {1e6 * model.offset:.5g} um fitted")
-    if model.drift:
-        lines.append(f"      {model.drift}")
-    if model.delay:
-        lines.append(f"      delay {1e3 * model.delay:.4g} ms")
-    return "\n".join([*lines, "", *_values(model, info.parameters)])
+    lines = [
+        f"{info.title}: stage identified from {source}, stroke {1e6 * model.stroke:.4g} um",
+        *rows([*of_stage(model), *of_sensor(model), *errors_of_file(model)]),
+        "",
+    ]
+    return "\n".join([*lines, *_values(model)])
 
 
 def _of_one(fit: Identification) -> list[str]:
     """Say from which record, and what is left of it."""
-    data = fit.data
-    lines = [
-        f"{fit.model.info.title}: stage identified from {data.source or 'a record'}, {_size(data)}",
-        f"cost  {fit.cost_um:.4g} um rms = {fit.cost_percent:.3g} % of stroke, "
-        f"fit {fit.fit_percent:.4g} %"
-        + (f", offset {1e6 * fit.offset:.5g} um fitted" if fit.offset_fitted else ""),
+    data, record = fit.data, fit.records[0]
+    of_record = [*of_sensor(record, data), *errors_of(fit, 0), ("record", _size(data))]
+    return [
+        f"{fit.model.info.title}: stage identified from {data.source or 'a record'}",
+        *rows([*of_stage(fit), *of_record]),
     ]
-    if fit.drift:
-        lines.append(f"      {fit.drift}")
-    if fit.delay and "delay" not in fit.parameters:
-        lines.append(f"      delay {1e3 * fit.delay:.4g} ms")
-    if begun := start_notes(fit.start, data):
-        lines.append(f"      the record begins {begun}")
-    return lines
 
 
 def _of_several(fit: Identification) -> list[str]:
     """Say from which records, what is left of each, and what each has of its own."""
+    rms = (
+        f"{length_text(fit.cost, 3)} of all ({fit.cost_percent:.3g} % of the largest stroke), "
+        f"fit {fit.fit_percent:.4g} %"
+    )
     lines = [
         f"{fit.model.info.title}: stage identified from {len(fit.records)} records",
-        f"cost  {fit.cost_um:.4g} um rms of all = {fit.cost_percent:.3g} % of the largest stroke, "
-        f"fit {fit.fit_percent:.4g} %",
+        *rows([*of_stage(fit), ("rms error", rms)]),
     ]
     for i, record in enumerate(fit.records):
         if record.data is None:
             continue
-        said = f"{1e6 * record.cost:.4g} um rms = {record.cost_percent:.3g} % of its stroke"
-        said += "" if record.weight == 1.0 else f", weight {record.weight:g}"
-        said += f", offset {1e6 * record.offset:.5g} um fitted" if record.offset_fitted else ""
-        if "delay" in record.parameters:
-            said += f", delay {1e3 * record.delay:.4g} ms" + _spread(record.parameters["delay"])
-        elif record.delay:
-            said += f", delay {1e3 * record.delay:.4g} ms"
+        weight = "" if record.weight == 1.0 else f", weight {record.weight:g}"
         lines += [
-            f"  {i + 1:>2}  {record.data.source or 'unnamed'}, {_size(record.data)}",
-            f"      {said}",
+            f"  {i + 1:>2}  {record.data.source or 'unnamed'}, {_size(record.data)}{weight}",
+            *rows([*of_sensor(record, record.data), *errors_of(fit, i)], indent=6),
         ]
-        if record.drift:
-            lines.append(f"      {record.drift}")
-        if begun := start_notes(record.start, record.data):
-            lines.append(f"      it begins {begun}")
     return lines
 
 
-def _spread(delay: Estimate) -> str:
-    """Write the standard deviation of a delay, where it is known."""
-    if delay.deviation is None or not math.isfinite(delay.deviation):
-        return ""
-    return f" +- {1e3 * delay.deviation:.2g} ms"
-
-
 def _size(data: Dataset) -> str:
-    """Write the size of a record."""
+    """Write the size of a record, as it was measured."""
+    data = data.measured
     return (
         f"{len(data)} samples, {data.duration:.4g} s at {1 / data.dt:.6g} Hz, "
         f"stroke {1e6 * data.stroke:.4g} um"
@@ -161,7 +136,7 @@ def _trials(fit: Identification) -> list[str]:
         return []
     width = max(len(trial.title) for trial in chosen.trials)
     return [
-        f"      chosen by the rms after {chosen.fitted_until:.4g} s, fitted before that:",
+        f"      models fitted up to {chosen.fitted_until:.4g} s, by their rms after it:",
         *(
             f"        {trial.title:<{width}}  {100 * trial.rms / fit.stroke:7.3g} %"
             f"  {trial.seconds:5.1f} s"
@@ -184,8 +159,7 @@ def _estimates(fit: Identification) -> list[str]:
     width = 1 + max(3, *(len(estimate.symbol) for estimate in fit.parameters.values()))
     lines.append(f"  {'':<18}{'':<{width}}{'value':>13}  {'':<9}{'standard deviation'}")
     lines += [_row(fit, name, estimate, width) for name, estimate in fit.parameters.items()]
-    lines += _values(fit, [one for one in fit.model.info.parameters if one.is_list])[1:-1]
-    lines += _constraints(fit)
+    lines += [*_lists(fit), *_constraints(fit), *_correlated(fit)]
     which = "this record" if len(fit.records) == 1 else "these records"
     if unclear := [n for n, e in fit.parameters.items() if not (e.identified or e.from_prior)]:
         lines += ["", f"Not determined by {which}: " + ", ".join(unclear) + "."]
@@ -196,42 +170,47 @@ def _estimates(fit: Identification) -> list[str]:
     return lines
 
 
-def _values(fit: IdentifiedModel, parameters: Iterable[Parameter]) -> list[str]:
-    """List the values of the parameters, lists of one length side by side in pairs."""
-    lines, parts = ["parameters"], list(parameters)
-    while parts:
-        parameter = parts.pop(0)
+def _values(fit: IdentifiedModel) -> list[str]:
+    """List the values of the parameters, and the names of those that are lists."""
+    lines = ["parameters"]
+    for parameter in fit.model.info.parameters:
         value = getattr(fit.model, parameter.name)
-        if value is None or value == ():
-            continue
-        if not parameter.is_list:
-            unit, scale = _shown(fit, parameter)
+        if value is not None and not parameter.is_list:
+            unit, scale = shown_unit(of_drive(parameter.unit, fit.drive_unit))
             row = f"  {parameter.name:<22}{parameter.symbol:<6}{scale * value:>12.6g}  {unit}"
             lines.append(row.rstrip())
-            continue
-        columns = [parameter]
-        if parts and parts[0].is_list and len(getattr(fit.model, parts[0].name)) == len(value):
-            columns.append(parts.pop(0))
-        lines += ["", "  " + "".join(f"{_heading(fit, column):>32}" for column in columns)]
-        for row_values in zip(*(_scaled(fit, column) for column in columns), strict=True):
-            lines.append("  " + "".join(f"{number:>32.6g}" for number in row_values))
-        lines.append("")
-    return lines
+    return [*lines, *_lists(fit)]
 
 
-def _shown(fit: IdentifiedModel, parameter: Parameter) -> tuple[str, float]:
-    """Return the unit in which a parameter is shown, and the factor from SI."""
-    return shown_unit(of_drive(parameter.unit, fit.drive_unit))
+def _lists(fit: IdentifiedModel) -> list[str]:
+    """Name the parameters that are lists, whose values are in the file of the model."""
+    counted: dict[int, list[str]] = {}
+    for one in fit.model.info.parameters:
+        if one.is_list and (values := getattr(fit.model, one.name)):
+            counted.setdefault(len(values), []).append(f"{one.name} {one.symbol}")
+    return [
+        f"  {count} value{'s' * (count > 1)} each, in the model file: {', '.join(names)}"
+        for count, names in counted.items()
+    ]
 
 
-def _heading(fit: IdentifiedModel, parameter: Parameter) -> str:
-    unit, _ = _shown(fit, parameter)
-    return f"{parameter.name} {parameter.symbol}" + (f" [{unit}]" if unit else "")
+def _correlated(fit: Identification) -> list[str]:
+    """Say that the standard deviations are too small, where residuals are correlated.
 
-
-def _scaled(fit: IdentifiedModel, parameter: Parameter) -> list[float]:
-    _, scale = _shown(fit, parameter)
-    return [scale * number for number in getattr(fit.model, parameter.name)]
+    Of residuals x_i = r x_(i-1) + white noise, and a parameter that shows slowly, they are so by
+    sqrt((1 + r) / (1 - r)) (Bartlett 1935, doi 10.2307/2342284).
+    """
+    stated = [one.deviation for one in fit.parameters.values() if one.free and one.deviation]
+    known = [one for one in fit.autocorrelations if one > CORRELATED]
+    if not known or not any(map(math.isfinite, stated)):
+        return []
+    r = min(max(known), 1.0 - 1e-9)
+    factor = math.sqrt((1.0 + r) / (1.0 - r))
+    return [
+        "",
+        f"Neighbouring residuals correlate by {r:.2g}: the standard deviations are lower bounds,",
+        f"up to about {factor:.2g} times too small.",
+    ]
 
 
 def _runs(search: SearchRun, method: Descents | ParticleSwarm) -> list[str]:

@@ -233,7 +233,8 @@ impl Base {
         let slope = DVector::from_fn(count, |i, _| product(&columns[i], &residual));
         let squares = product(&residual, &residual);
         let directions = directions.len();
-        Block { square, slope, columns, read, drift, stride, directions, squares }
+        let rows = read.len() - level.left_out.len();
+        Block { square, slope, columns, read, drift, rows, stride, directions, squares }
     }
 }
 

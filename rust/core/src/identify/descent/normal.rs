@@ -93,6 +93,8 @@ pub(in crate::identify) struct Block {
     pub read: Vec<f64>,
     /// The drift that suits the place best.
     pub drift: Option<Drift>,
+    /// Rows whose displacement counts.
+    pub rows: usize,
     /// Samples of the window to a row.
     pub stride: usize,
     /// Columns that are of weights.
@@ -116,7 +118,7 @@ pub(in crate::identify) struct Extended {
 impl Extended {
     /// Of the blocks of records, with so many coordinates.
     pub fn of(members: &[Member<'_>], blocks: &[Block], count: usize) -> Self {
-        let rows = blocks.iter().map(|block| block.read.len()).sum();
+        let rows = blocks.iter().map(|block| block.rows).sum();
         let size = count + blocks.first().map_or(0, |block| block.directions);
         let (square, slope) = (DMatrix::zeros(size, size), DVector::zeros(size));
         let mut all = Self { square, slope, squares: 0.0, rows, count };
@@ -156,7 +158,7 @@ impl Extended {
 
     /// How much a block of a record counts.
     pub fn scale_of(&self, one: &Member<'_>, block: &Block) -> f64 {
-        one.share * index(self.rows) / index(block.read.len())
+        one.share * index(self.rows) / index(block.rows)
     }
 
     /// Where the columns of a block of a record are among all.

@@ -1,0 +1,208 @@
+"""The quantities of a stage and of its record, as the summary of a fit begins with them."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from ..._support.units import length_text, of_drive, shown_unit
+from ...errors import NumericalError
+from ..fitted.notes import start_notes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from ...data.dataset import Dataset
+    from ..fitted.drift import Drift
+    from ..fitted.fitted_record import FittedRecord
+    from ..fitted.identification import Identification
+    from ..fitted.identified_model import IdentifiedModel
+
+__all__ = ["errors_of", "errors_of_file", "of_sensor", "of_stage", "rows"]
+
+Row = tuple[str, str]
+
+# Ratio of a time constant to its record from which on a drift is a straight line.
+STRAIGHT = 5.0
+# Share of the travel from which on a loop is wide enough to show.
+CLOSED = 1e-6
+
+
+def rows(quantities: Iterable[Row], indent: int = 2) -> list[str]:
+    """Write quantities below each other.
+
+    Parameters
+    ----------
+    quantities : iterable of (str, str)
+        Name, and value with its unit.
+    indent : int, optional
+        Blanks before each.
+
+    Returns
+    -------
+    list of str
+        One line each.
+    """
+    return [f"{'':<{indent}}{name:<10} {value}" for name, value in quantities]
+
+
+def of_stage(model: IdentifiedModel) -> list[Row]:
+    """Return gain, hysteresis, creep and lag of a stage, those that it has.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+
+    Returns
+    -------
+    list of (str, str)
+        Name, and value with its unit.
+    """
+    stage = model.model
+    found = [*_loop(model), *_creep(stage)]
+    lag = stage.damping / stage.stiffness if hasattr(stage, "stiffness") else stage.time_constant
+    if lag:
+        found.append(("lag", f"{1e3 * lag:.3g} ms"))
+    if getattr(stage, "frequency", None) is not None:
+        modes = [stage.frequency, *stage.mode_frequencies]
+        found.append(("mode", f"{', '.join(f'{one:.4g}' for one in modes)} Hz"))
+    return found
+
+
+def of_sensor(own: FittedRecord | IdentifiedModel, data: Dataset | None = None) -> list[Row]:
+    """Return delay, drift, offset and beginning of a record, those that it has.
+
+    Parameters
+    ----------
+    own : FittedRecord or IdentifiedModel
+        What belongs to the record.
+    data : Dataset, optional
+        The record, where it is there.
+
+    Returns
+    -------
+    list of (str, str)
+        Name, and value with its unit.
+    """
+    found: list[Row] = []
+    if own.delay or "delay" in getattr(own, "parameters", {}):
+        found.append(("delay", f"{1e3 * own.delay:.4g} ms{_spread(own)}"))
+    if own.drift:
+        found.append(("drift", _drift(own.drift)))
+    if own.offset_fitted:
+        found.append(("offset", f"{1e6 * own.offset:.5g} um, fitted"))
+    if data is not None and (begun := start_notes(own.start, data)):
+        found.append(("start", begun))
+    return found
+
+
+def errors_of(fit: Identification, i: int) -> list[Row]:
+    """Return rms and largest error of a fit on one of its records, and its noise.
+
+    Parameters
+    ----------
+    fit : Identification
+        The fit.
+    i : int
+        Which of its records.
+
+    Returns
+    -------
+    list of (str, str)
+        One row, and one of the share of the motion where there is one record.
+    """
+    record, score = fit.records[i], fit.scores[i]
+    several = len(fit.records) > 1
+    return _errors(
+        record.cost,
+        record.stroke,
+        (score.max_error, score.max_error_time),
+        fit.noises[i],
+        math.nan if several else fit.fit_percent,
+    )
+
+
+def errors_of_file(model: IdentifiedModel) -> list[Row]:
+    """Return rms and largest error of a model that was read from a file, and its noise.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+
+    Returns
+    -------
+    list of (str, str)
+        As of a fit, or none where the file has no rms error.
+    """
+    entries = model.details.get("fit")
+
+    def number(name: str) -> float:
+        entry: Any = entries.get(name) if isinstance(entries, dict) else None
+        value = entry.get("value") if isinstance(entry, dict) else None
+        return float(value) if isinstance(value, (int, float)) else math.nan
+
+    if math.isnan(cost := number("cost")):
+        return []
+    largest = number("max_error"), number("max_error_time")
+    return _errors(cost, model.stroke, largest, number("noise"), number("fit_percent"))
+
+
+def _loop(model: IdentifiedModel) -> list[Row]:
+    """Gain and hysteresis of the slow loop over the drive identified."""
+    loop = None
+    with suppress(NumericalError):
+        loop = model.slow_loop
+    if loop is None or not math.isfinite(loop.gain):
+        return []
+    per = of_drive("V", model.drive_unit) if model.drive_unit != "N" else "N"
+    unit, scale = shown_unit(f"m/{per}")
+    if unit == "m/N":
+        unit, scale = "um/N", 1e6
+    found = [("gain", f"{scale * loop.gain:.4g} {unit}")]
+    if loop.width > CLOSED * abs(loop.travel):
+        share = f"{loop.width_percent:.3g} % of the travel"
+        found.append(("hysteresis", f"{share}, {length_text(loop.width, 3)}"))
+    return found
+
+
+def _creep(stage: Any) -> list[Row]:
+    """Share and time constant of each relaxation that is not 0."""
+    parts = [(w, t) for w, t in zip(stage.creep_weights, stage.creep_times, strict=True) if w]
+    if not parts:
+        return []
+    each = ", ".join(f"{100.0 * w:.2g} % in {t:.3g} s" for w, t in parts)
+    whole = f"{100.0 * math.fsum(w for w, _ in parts):.2g} %: " if len(parts) > 1 else ""
+    return [("creep", f"{whole}{each}")]
+
+
+def _drift(drift: Drift) -> str:
+    lasting = drift.end - drift.begin
+    if lasting > 0.0 and drift.time > STRAIGHT * lasting:
+        return f"{1e6 * drift.moved / lasting:.3g} um/s, {1e6 * drift.moved:.3g} um over the record"
+    return f"{1e6 * drift.moved:.3g} um over the record, time constant {drift.time:.3g} s"
+
+
+def _spread(own: FittedRecord | IdentifiedModel) -> str:
+    """Write the standard deviation of a delay, where it is known."""
+    estimate = getattr(own, "parameters", {}).get("delay")
+    deviation = None if estimate is None else estimate.deviation
+    if deviation is None or not math.isfinite(deviation):
+        return ""
+    return f" +- {1e3 * deviation:.2g} ms"
+
+
+def _errors(
+    rms: float, stroke: float, largest: tuple[float, float], noise: float, fit: float
+) -> list[Row]:
+    """Rms and largest error side by side with the noise."""
+    most, when = largest
+    text = f"{length_text(rms, 3)} ({100.0 * rms / stroke:.3g} % of stroke)"
+    if not (math.isnan(most) or math.isnan(when)):
+        text += f", largest {length_text(most, 3)} at {when:.6g} s"
+    if noise > 0.0:
+        text += f", noise {length_text(noise, 3)}"
+    found = [("rms error", text)]
+    return found if math.isnan(fit) else [*found, ("fit", f"{fit:.4g} % of the motion")]
