@@ -13,8 +13,7 @@ use super::slow_parts::{creeps, with_drift};
 use super::trials::{Trial, settled_all, with_each};
 use crate::identify::least_squares::settings::{
     CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, HISTORY_GAIN,
-    LAG_BESIDE_CREEP_GAIN,
-    MODE_GAIN, ROUGH, Settings, UNSEEN_GAIN,
+    LAG_BESIDE_CREEP_GAIN, MODE_GAIN, ROUGH, Settings, UNSEEN_GAIN,
 };
 use crate::identify::least_squares::solving::fit::Fit;
 use crate::identify::least_squares::solving::form::Form;
@@ -22,8 +21,9 @@ use crate::identify::parameters::drift::{DriftKind, repeats};
 use crate::identify::records::history::History;
 use crate::signal::range;
 
-/// Rounds through all parts, at most.
+/// Rounds through all parts, at most; and of starts, the best of which goes on.
 pub(super) const ROUNDS: usize = 4;
+pub(super) const FIRST_ROUNDS: usize = 1;
 
 /// Share of the stroke below which no sensor shows a deviation.
 const UNSEEN: f64 = 1e-6;
@@ -91,19 +91,14 @@ impl Refinement<'_> {
         for _ in 0..rounds {
             let before = self.cost(fit);
             self.histories(fit)?;
-            self.refine_rest(fit)?;
+            self.slow_and_late(fit)?;
+            self.creep_times(fit)?;
+            self.dynamics(fit)?;
             if self.cost(fit) > before - LEAST_GAIN {
                 break;
             }
         }
         Some(())
-    }
-
-    /// Moves to a better structure once, with the histories that the fit has.
-    pub fn refine_rest(&self, fit: &mut Fit<'_>) -> Option<()> {
-        self.slow_and_late(fit)?;
-        self.creep_times(fit)?;
-        self.dynamics(fit)
     }
 
     /// Takes the best of some ways where it is better than the fit.

@@ -6,10 +6,10 @@ use super::histories::{fitted_history, with_history};
 use super::lag::{best_lag, relaxes_as_well, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::nodes::{add_once, choose_nodes, few_or_many, spread};
-use super::refinement::{ROUNDS, Refinement};
+use super::refinement::{FIRST_ROUNDS, ROUNDS, Refinement};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
-use crate::identify::least_squares::common::{Common, Thinned};
+use crate::identify::least_squares::common::Common;
 use crate::identify::least_squares::settings::{
     CreepKind, DynamicsKind, FIRST_SHARE, HISTORY_GAIN, MODE_GAIN, NodesKind, ROUGH, SAME, STEPS,
     Settings, Structure, UNSEEN_GAIN,
@@ -19,6 +19,7 @@ use crate::identify::least_squares::solving::form::Form;
 use crate::identify::least_squares::weights_record::WeightsRecord;
 use crate::identify::parameters::drift::DriftKind;
 use crate::identify::records::history::History;
+use crate::identify::records::thinned::{Thinned, thinning};
 use crate::math::least;
 use crate::models::Nodes;
 use crate::signal::index;
@@ -43,17 +44,17 @@ const ROWS_OF_LEVELS: usize = 4000;
 /// Starts of one history each that are refined: those of least cost.
 const REFINED: usize = 2;
 
-/// Longest interval of a thinned record, as a phase of the drive, rad: its peaks are then known to
-/// a thousandth of the travel.
-const LONGEST_PHASE: f64 = 0.06;
-
 /// The best stage; `None` where stopped.
 pub(in crate::identify::least_squares) fn search<'a>(
     common: &'a Common<'a>,
     settings: &Settings,
 ) -> Option<Fit<'a>> {
-    let kept: Vec<Thinned> =
-        common.records.iter().map(|one| Thinned::of(one, thinning(one, rows_of(common)))).collect();
+    let rows = rows_of(common);
+    let thin = |one: &WeightsRecord<'_>| {
+        let every = thinning(&one.measures(), one.drive.dt, one.samples(), rows);
+        Thinned::of(&one.drive, one.y, one.left_out, if one.is_delayed() { 1 } else { every })
+    };
+    let kept: Vec<Thinned> = common.records.iter().map(thin).collect();
     let few = common.thinned(&kept);
     let chosen = choose(&few, settings)?;
     common.count(few.evaluations());
@@ -68,16 +69,6 @@ pub(in crate::identify::least_squares) fn search<'a>(
 /// Rows that choices are made on.
 fn rows_of(common: &Common<'_>) -> usize {
     if common.of.nodes() == Nodes::Levels { ROWS_OF_LEVELS } else { ROWS }
-}
-
-/// Every how many samples the choices are made on: where the drive is slow all the time, as many as
-/// leave so many rows.
-fn thinning(record: &WeightsRecord<'_>, rows: usize) -> usize {
-    let of = record.measures();
-    let most = LONGEST_PHASE / (of.frequency * record.drive.dt);
-    let every = record.samples() / rows;
-    let few = of.excited().is_none() && index(every) < most && !record.is_delayed();
-    if few { every.max(1) } else { 1 }
 }
 
 /// The structure, on records that may be thinned.
@@ -113,7 +104,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     begun.truncate(REFINED);
     let found = with_each(&begun, |start| {
         let mut trial = start.clone();
-        refinement.refine_rest(&mut trial)?;
+        refinement.refine(&mut trial, FIRST_ROUNDS)?;
         Some(trial)
     })?;
     let better =
