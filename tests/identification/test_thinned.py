@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
 import piezotrack as pt
 from play_records import PLAIN
+
+if TYPE_CHECKING:
+    from piezotrack.stages.base import Stage
 
 NOISE = 5e-9
 
@@ -21,7 +26,7 @@ DAHL = pt.FirstOrderDahlStage(
 )
 
 
-def slow(stage: pt.Stage, samples: int = 20_000) -> pt.Dataset:
+def slow(stage: Stage, samples: int = 20_000) -> pt.Dataset:
     """Return a record of six periods of a sine whose amplitude falls."""
     t = np.linspace(0.0, 6.0, samples)
     u = 37.5 * (1.0 - np.exp(-t / 12.0) * np.cos(2.0 * np.pi * t))
@@ -32,7 +37,7 @@ def slow(stage: pt.Stage, samples: int = 20_000) -> pt.Dataset:
 
 @pytest.mark.parametrize(("model", "stage"), [("first-order-dahl", DAHL), ("bouc-wen", PLAIN)])
 def test_descents_on_a_thinned_record_end_where_a_search_on_all_samples_does(
-    model: str, stage: pt.Stage
+    model: str, stage: Stage
 ) -> None:
     log = slow(stage)
     thinned = pt.identify(log, model, method=pt.Descents(seed=1), history="virgin")
