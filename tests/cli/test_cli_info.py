@@ -153,3 +153,24 @@ def test_identify_and_compare_decimate() -> None:
     for table in (one, two):
         table.pop("written")
     assert str(one).replace("log.csv", "half.npz") == str(two)
+
+
+def test_a_model_is_not_taken_for_a_log() -> None:
+    write_model()
+    for command in ("info", "identify"):
+        assert "dahl.json: is a file that piezotrack wrote" in refusal(command, "dahl.json")
+
+
+def test_a_window_may_have_its_unit() -> None:
+    from piezotrack.cli.options import seconds
+
+    assert seconds("--window", "1s:2500ms") == (1.0, 2.5)
+    assert seconds("--window", "1:") == (1.0, None)
+    for wrong in ("1V:2", "s:2", "1e:2"):
+        with pytest.raises(pt.ParameterError, match="--window has"):
+            seconds("--window", wrong)
+
+
+def test_a_campaign_takes_a_window_of_each_log_and_no_more() -> None:
+    said = refusal("campaign", "log.csv", "--window", "1:2", "--window", "2:3")
+    assert "--window is given 2 times with 1 log" in said

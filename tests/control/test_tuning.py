@@ -159,7 +159,7 @@ def test_shares_of_what_was_asked_for() -> None:
         ({"parts": "repetitive", "reference": None}, "expected references that repeat"),
         ({"margins": 2.0}, "margins is float"),
         ({"spread": 0.1}, "spread is float"),
-        ({"reference": "sine"}, "reference is '"),
+        ({"reference": "sine"}, "reference 'sine': there is no frequency"),
         ({"feedforward": "dahl"}, "feedforward is 'dahl'"),
         ({"goal": "rms"}, "goal is str: expected pt.Goal"),
         ({"goal": pt.Goal(effort=-1.0)}, "effort is -1"),

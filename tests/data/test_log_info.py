@@ -294,3 +294,50 @@ def test_the_fastest_part_of_a_drive_says_the_rate(frequency: float) -> None:
     factor = spare_factor(np.sin(2.0 * np.pi * t) + burst + noise, 5e-5)
     samples = 20_000.0 / factor / frequency
     assert (factor == 1) if frequency == 40.0 else (100.0 < samples < 260.0)
+
+
+def hysteresis(u: Array) -> Array:
+    stage = pt.PrandtlIshlinskiiStage(linear=0.6e-6, thresholds=(5.0, 15.0), weights=(1e-7, 1e-7))
+    y: Array = stage.simulate(u, DT).x
+    return y + NOISE * np.random.default_rng(4).standard_normal(u.size)
+
+
+def test_a_rest_after_the_motion_shows_creep_at_one_rate_too(tmp_path: Path) -> None:
+    rested = said(pt.data.info(written(tmp_path, np.r_[sine(1.0, 2.5), np.full(8000, 60.0)])))
+    assert "creep with time constants up to that" in rested
+    assert "creep and hysteresis cannot" not in rested
+    assert "one rate, 1 Hz: lag, delay and hysteresis cannot be distinguished" in rested
+
+
+def test_what_is_left_out_is_not_in_the_stroke(tmp_path: Path) -> None:
+    u = sine(1.0, 5.0)
+    y = hysteresis(u)
+    y[2100] = 0.1
+    found = pt.data.info(pt.Dataset(u=u, y=y, dt=DT).save(tmp_path / "log.npz"))
+    assert found.stroke == pytest.approx(46e-6, rel=0.01)
+    assert "left out as a single reading far off" in found.notes[0]
+
+
+def test_no_model_where_the_displacement_does_not_follow(tmp_path: Path) -> None:
+    u = sine(1.0, 20.0)
+    y, noise = hysteresis(u), NOISE * np.random.default_rng(5).standard_normal(u.size)
+    for drive, moved, note in (
+        (1e6 * y, 1e-6 * u, "swapped"),
+        (u, noise, "is the sensor connected?"),
+    ):
+        found = pt.data.info(pt.Dataset(u=drive, y=moved, dt=DT).save(tmp_path / "log.npz"))
+        assert note in found.notes[0]
+        assert said(found).startswith("no model before")
+        assert len(found.determines) == 1
+    # A line up is followed, although it has no correlation but for its slope.
+    ramp = np.linspace(0.0, 10.0, 5000)
+    assert pt.data.info(written(tmp_path, ramp)).notes == ()
+
+
+def test_the_lower_rate_is_not_called_enough_for_a_mode_above_it(tmp_path: Path) -> None:
+    u = sine(1.0, 20.0)
+    for noise, mode in ((0.0, True), (NOISE, False)):
+        found = pt.data.info(written(tmp_path, u, noise=noise))
+        assert ("mode up to 450 Hz" in said(found)) == mode
+        assert found.notes[0].startswith("1 kHz for a 1 Hz drive: 200 Hz are enough")
+        assert found.notes[0].endswith("; not for a mode above 90 Hz") == mode

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from contextlib import contextmanager
 from pathlib import Path
+from string import ascii_letters
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -251,8 +252,19 @@ def seconds(option: str, text: str) -> tuple[float | None, float | None]:
     start, colon, stop = text.partition(":")
     if not colon:
         raise ParameterError(option, f"'{text}'", "A:B in seconds, as 3:23")
-    first, last = (number(option, end) if end else None for end in (start, stop))
+    first, last = (_in_seconds(option, end) if end else None for end in (start, stop))
     return first, last
+
+
+def _in_seconds(option: str, text: str) -> float:
+    """Parse a time with or without its unit [s]."""
+    from .._support.units import lookup
+
+    plain = text.rstrip(ascii_letters)
+    unit = lookup(text[len(plain) :]) if plain != text else None
+    if unit is None or unit.quantity != "time":
+        return number(option, text)
+    return number(option, plain) * unit.factor / unit.divisor
 
 
 def windowed(log: Dataset, file: Path, option: str, window: str | None) -> Dataset:

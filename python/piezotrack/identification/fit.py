@@ -155,7 +155,8 @@ def identify(
         Up to 256; all cores where it is 0 or not given.
     progress : bool, optional
         Whether progress is shown: a bar in a terminal or notebook, elsewhere a line on stderr
-        every few seconds; where not given, the bar only.
+        every few seconds; where not given, the bar only. It is in per cent of all models and parts
+        of the call, with the seconds that are left at most at the pace so far.
     callback : callable, optional
         Called with a `Progress` after every iteration; a true return value, or StopIteration,
         stops the search.

@@ -9,6 +9,8 @@ from contextvars import ContextVar
 from threading import Event, Thread
 from typing import TYPE_CHECKING
 
+from .progress_parts import part_at_work
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from types import TracebackType
@@ -84,6 +86,7 @@ class ProgressBar:
 
     def __init__(self, show: bool | None, task: str) -> None:
         self._view: _Bar | _Words | None = None
+        self._part = part_at_work()
         if show is not None and not show:
             return
         place = console()
@@ -114,11 +117,14 @@ class ProgressBar:
             Of what, as ``"20 seeds"``.
         """
         if self._view is not None:
-            self._view.step(done, total, words)
+            share = done / total if total else 0.0
+            said = ", ".join(filter(None, (self._part.words(share), words)))
+            self._view.step(self._part.share(share), said)
 
     def __enter__(self) -> Self:
         if self._view is not None:
-            self._view.start()
+            # What reports nothing inside is a part all the same.
+            self._view.start(self._part.share(0.0), self._part.words(0.0))
         return self
 
     def __exit__(
@@ -147,16 +153,19 @@ class _Bar:
             transient=True,
         )
         self._task = self._bar.add_task(task, total=None, words="")
+        self._leaves_nothing = place.is_terminal and not place.is_jupyter
 
-    def start(self) -> None:
-        """Draw nothing yet: what takes no time would leave an empty place in a notebook."""
+    def start(self, share: float, words: str) -> None:
+        """Draw a later part; in a notebook, what takes no time would leave an empty place."""
+        if share and self._leaves_nothing:
+            self.step(share, words)
 
     def stop(self) -> None:
         self._bar.stop()
 
-    def step(self, done: int, total: int, words: str) -> None:
+    def step(self, share: float, words: str) -> None:
         self._bar.start()
-        self._bar.update(self._task, completed=done, total=total or None, words=words)
+        self._bar.update(self._task, completed=share, total=1.0 if share else None, words=words)
 
 
 class _Words:
@@ -167,14 +176,16 @@ class _Words:
         self._clock = _clock.get() or _Clock()
         self._ended = Event()
 
-    def start(self) -> None:
+    def start(self, share: float, words: str) -> None:
+        self.step(share, words)
         Thread(target=self._write, daemon=True).start()
 
     def stop(self) -> None:
         self._ended.set()
 
-    def step(self, done: int, total: int, words: str) -> None:
-        self._words = f"{100.0 * done / total:.0f} % of {words}" if total else words
+    def step(self, share: float, words: str) -> None:
+        del share
+        self._words = words
 
     def _write(self) -> None:
         while not self._ended.wait(self._clock.wait):

@@ -23,7 +23,6 @@ from ..options import (
     MissingOption,
     Quiet,
     Resample,
-    Seconds,
     TimeColumn,
     Units,
     Zero,
@@ -52,8 +51,10 @@ from .fit_options import (
     Scales,
     Swarm,
     Ties,
+    Windows,
     delay_asked,
     drift_asked,
+    each_of,
     searched,
 )
 
@@ -72,7 +73,7 @@ def campaign_command(
     files: Annotated[
         list[Path], typer.Argument(metavar="FILE", help="Logs of any format, with their units.")
     ],
-    window: Seconds = None,
+    window: Windows = None,
     model: KindsNamed = None,
     seeds: Annotated[
         str,
@@ -176,9 +177,10 @@ def campaign_command(
     }
     numbers = _seeds(seeds)
     columns = Columns(time, drive, displacement, unit, dt, decimate, zero)
+    titles, windows = _titles(files), each_of("--window", window, len(files))
     logs = {
-        title: windowed(columns.read(file, hold, resample, missing), file, "--window", window)
-        for title, file in _titles(files).items()
+        title: windowed(columns.read(file, hold, resample, missing), file, "--window", one)
+        for (title, file), one in zip(titles.items(), windows, strict=True)
     }
     with _executor(workers, dask) as executor:
         try:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..._support.display.progress_parts import Parts
 from ...errors import Interrupted, ParameterError
 from ..error_messages import report_errors
 from ..interruption import acknowledge_interrupt
@@ -186,8 +187,10 @@ def identify_command(
     words: list[str] = []
     documents: list[dict[str, Any]] = []
     written: list[Path] = []
-    for kind in kinds.names:
-        with nullcontext() if len(files) > 1 else of_file(files[0]):
+    # About how long each takes.
+    parts = Parts([5.0 if kind == AUTO or searched(kind) else 1.0 for kind in kinds.names])
+    for i, kind in enumerate(kinds.names):
+        with nullcontext() if len(files) > 1 else of_file(files[0]), parts.begin(i):
             fit = _search(
                 records,
                 out,

@@ -88,7 +88,8 @@ def unusual_connection(u: Array, y: Array) -> Connection | None:
     u, y = u[:LOOKED_AT], y[:LOOKED_AT]
     if u.size < FEWEST or np.ptp(u) == 0.0 or np.ptp(y) == 0.0:
         return None
-    drive, moved = _plain(u), _plain(y)
+    sloped = _is_line(u)
+    drive, moved = _plain(u, sloped=sloped), _plain(y, sloped=sloped)
     most = _correlation(drive, moved)
     if most < _chance(u.size) and not _foretells(drive, moved):
         share = f"the drive explains {100.0 * most**2:.1f} % of the displacement"
@@ -114,17 +115,24 @@ def unusual_connection(u: Array, y: Array) -> Connection | None:
     return None
 
 
-def _plain(values: Array) -> Array:
-    """Take mean and slope off, and scale to a sum of squares of 1."""
+def _level(values: Array) -> Array:
+    """Take mean and slope off."""
     along = np.linspace(-1.0, 1.0, values.size)
     left = values - values.mean()
-    left = left - along * float(along @ left) / float(along @ along)
-    size = math.sqrt(float(left @ left))
-    # A drive that goes straight on is its slope.
-    if size <= 1e-6 * float(np.ptp(values)) * math.sqrt(values.size):
-        left = values - values.mean()
-        size = math.sqrt(float(left @ left))
-    plain: Array = left / size
+    level: Array = left - along * float(along @ left) / float(along @ along)
+    return level
+
+
+def _is_line(values: Array) -> bool:
+    """Return whether nothing is left of a signal without mean and slope."""
+    size = float(np.linalg.norm(_level(values)))
+    return size <= 1e-6 * float(np.ptp(values)) * math.sqrt(values.size)
+
+
+def _plain(values: Array, *, sloped: bool) -> Array:
+    """Take the mean off, and the slope but of a drive that is its slope; scale to a norm of 1."""
+    left = values - values.mean() if sloped or _is_line(values) else _level(values)
+    plain: Array = left / np.linalg.norm(left)
     return plain
 
 

@@ -275,7 +275,7 @@ def drive_notes(time: TimeFeatures, drive: DriveFeatures, stroke: float | None) 
         *_of_time(time),
         _of_reversals(drive),
         *(_of_amplitudes(drive) if drive.turns >= 2 else []),
-        *(_of_frequencies(drive) if drive.turns >= 2 and not drive.steps else []),
+        *(_of_frequencies(drive, time) if drive.turns >= 2 and not drive.steps else []),
         _of_mode(time, drive),
         _of_rests(time, drive),
     ]
@@ -326,14 +326,14 @@ def _of_amplitudes(drive: DriveFeatures) -> list[str]:
     ]
 
 
-def _of_frequencies(drive: DriveFeatures) -> list[str]:
+def _of_frequencies(drive: DriveFeatures, time: TimeFeatures) -> list[str]:
     if not drive.frequencies:
         return []
     least, most = drive.frequencies
     if most < 2.0 * least:
-        return [
-            f"one rate, {most:.3g} Hz: lag, delay, creep and hysteresis cannot be distinguished"
-        ]
+        # A rest shows creep.
+        what = "lag, delay" if _longest_rest(time, drive) else "lag, delay, creep"
+        return [f"one rate, {most:.3g} Hz: {what} and hysteresis cannot be distinguished"]
     known = "lag and delay can" if most >= DECADE * least else "a lag can partly"
     return [f"rates from {least:.3g} Hz to {most:.3g} Hz: {known} be distinguished from hysteresis"]
 
@@ -351,14 +351,19 @@ def _of_mode(time: TimeFeatures, drive: DriveFeatures) -> str:
 
 
 def _of_rests(time: TimeFeatures, drive: DriveFeatures) -> str:
-    # Before the first motion there is nothing to creep after.
-    rests = [stop - start for start, stop, _ in drive.rests if start > time.begin]
-    if not rests:
+    longest = _longest_rest(time, drive)
+    if not longest:
         return (
             "no rests after the first motion: creep and hysteresis cannot be distinguished; record "
             "a step and a hold of minutes"
         )
-    return f"the drive rests for up to {max(rests):.3g} s: creep with time constants up to that"
+    return f"the drive rests for up to {longest:.3g} s: creep with time constants up to that"
+
+
+def _longest_rest(time: TimeFeatures, drive: DriveFeatures) -> float:
+    """Return the longest rest after the first motion [s]; 0 where there is none."""
+    # Before it there is nothing to creep after.
+    return max((stop - start for start, stop, _ in drive.rests if start > time.begin), default=0.0)
 
 
 def _drive(value: float, drive: DriveFeatures) -> str:

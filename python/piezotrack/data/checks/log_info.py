@@ -293,19 +293,29 @@ def info(
         except DataError as error:
             problems.append(str(error))
             u = y = None
+    far = _far(u, y)
+    # What is said of the displacement leaves out what a fit does.
+    plain = y if y is None or far is None or not are_few(far) else bridged(y, far)
+    connection = None
+    if u is not None and plain is not None and far is not None:
+        connection = unusual_connection(u, plain)
     times = time_features(t) if t is not None and t.size > 1 else None
-    found, stroke = None, None if y is None else float(np.ptp(y))
+    found, stroke = None, None if plain is None else float(np.ptp(plain))
     if t is not None and u is not None:
-        found = drive_features(t, u, y, _si(roles["drive"]))
+        found = drive_features(t, u, plain, _si(roles["drive"]))
     # Of a log that is read as it is: another has no even rate, or not yet.
     spare: list[str] = []
     if times is not None and u is not None and y is not None and not problems:
-        spare = sampling_notes(u, times.interval)
+        spare = sampling_notes(u, times.interval, 0.0 if found is None else found.mode_limit)
     sentences: list[str] = []
-    if times is not None and found is not None:
+    if connection is not None and not connection.follows:
+        sentences = ["no model before drive and displacement go together: see the note"]
+    elif times is not None and found is not None:
         sentences = drive_notes(times, found, stroke)
     elif stroke is not None and problems and problems[0].startswith(NO_DRIVE):
         sentences = ["no drive: the noise of a sensor at rest (piezotrack noise), or a reference"]
+    said = far_notes(t, y, far) if t is not None and y is not None and far is not None else []
+    said += [] if connection is None else [connection.note]
     return LogInfo(
         source=log.source.name,
         format=format_of(log.source).name,
@@ -316,17 +326,13 @@ def info(
         drive=found,
         stroke=stroke,
         determines=tuple(sentences),
-        notes=(*log.columns.notes, *lost, *_of_signals(t, u, y), *spare),
+        notes=(*log.columns.notes, *lost, *said, *spare),
     )
 
 
-def _of_signals(t: Array | None, u: Array | None, y: Array | None) -> list[str]:
-    """Say which readings are far off, and whether the displacement follows the drive."""
-    if t is None or u is None or y is None or not t.size == u.size == y.size:
-        return []
-    far = far_readings(u, y)
-    connection = unusual_connection(u, bridged(y, far) if are_few(far) else y)
-    return [*far_notes(t, y, far), *([] if connection is None else [connection.note])]
+def _far(u: Array | None, y: Array | None) -> NDArray[np.bool_] | None:
+    """Find the readings that are far off; None without both signals."""
+    return None if u is None or y is None or u.size != y.size else far_readings(u, y)
 
 
 def _attempts(given: Mapping[str, str | int | None]) -> list[dict[str, str | int | None]]:

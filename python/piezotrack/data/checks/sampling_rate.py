@@ -24,6 +24,8 @@ PER_PERIOD = 200
 SPARE, FEWEST = 4, 2000
 # Times the noise of the drive that is no motion.
 NOISE = 6.0
+# Share of the sampling rate up to which modes are searched.
+HIGHEST = 0.45
 
 
 def spare_factor(u: Array, dt: float) -> int:
@@ -55,7 +57,7 @@ def spare_factor(u: Array, dt: float) -> int:
     return _factor(_fastest(u, dt), u.size, dt)
 
 
-def sampling_notes(u: Array, dt: float) -> list[str]:
+def sampling_notes(u: Array, dt: float, mode_limit: float = 0.0) -> list[str]:
     """Say where a record is sampled far above what its drive needs.
 
     Parameters
@@ -64,6 +66,8 @@ def sampling_notes(u: Array, dt: float) -> list[str]:
         Drive [V].
     dt : float
         Sampling interval [s].
+    mode_limit : float, optional
+        Natural frequency up to which a mode would show [Hz].
 
     Returns
     -------
@@ -82,7 +86,10 @@ def sampling_notes(u: Array, dt: float) -> list[str]:
         return []
     rate, lower = _hertz(1.0 / dt), _hertz(1.0 / (factor * dt))
     needed = f"{rate} for a {_hertz(frequency, 2)} drive: {lower} are enough"
-    return [f"{needed}, log.decimate({factor})"]
+    # A mode that would show now and not at the lower rate.
+    highest = HIGHEST / (factor * dt)
+    lost = f"; not for a mode above {_hertz(highest, 2)}" if mode_limit > highest else ""
+    return [f"{needed}, log.decimate({factor}){lost}"]
 
 
 def _fastest(u: Array, dt: float) -> float:
@@ -106,4 +113,4 @@ def _factor(frequency: float, count: int, dt: float) -> int:
 
 
 def _hertz(value: float, digits: int = 3) -> str:
-    return f"{value / 1e3:.{digits}g} kHz" if value >= 1e3 else f"{value:.{digits}g} Hz"
+    return f"{value / 1e3:.{digits}g} kHz" if value >= 999.5 else f"{value:.{digits}g} Hz"

@@ -71,4 +71,6 @@ def open_log(path: str | os.PathLike[str]) -> Table:
     source = Source(path)
     if not source.size:
         raise source.error("is empty: expected a log")
+    if source.head.lstrip().startswith(b"{") and b'"piezotrack-' in source.head:
+        raise source.error("is a file that piezotrack wrote, as a model: expected a log")
     return format_of(source).opens(source)

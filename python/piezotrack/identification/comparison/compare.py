@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ... import _core
 from ..._support.arguments import expect, has_entries, one_of
+from ..._support.display.progress_parts import Parts
 from ..._support.display.result import Result
 from ..._support.files.writing import (
     make_folder,
@@ -284,17 +285,25 @@ def compare(
     first, second = first.without_far_readings(), second.without_far_readings()
     method = (Descents(seed=seed, runs=runs), LeastSquares())
     rows = []
-    for name, title, source in wanted:
+    # About how long each takes.
+    parts = Parts(
+        [
+            (5.0 if one.searched else 1.0) if isinstance(one, ModelInfo) else 0.1
+            for _, _, one in wanted
+        ]
+    )
+    for i, (name, title, source) in enumerate(wanted):
         found: IdentifiedModel
         if isinstance(source, ModelInfo):
-            found = identify(
-                first,
-                source.name,
-                history=history,
-                method=method,
-                threads=threads,
-                progress=progress,
-            )
+            with parts.begin(i):
+                found = identify(
+                    first,
+                    source.name,
+                    history=history,
+                    method=method,
+                    threads=threads,
+                    progress=progress,
+                )
         else:
             found = source
         rows.append(_compared(name, title, found, first, second, carried))

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..._support.display.progress_bar import ProgressBar
+from ..._support.display.progress_parts import Parts
 from ...errors import Interrupted
 from ..fitted.start import GAIN
 from ..methods.least_squares import LeastSquares
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from .weights import Structure
 
 __all__ = ["identify_model"]
+
+# Parts of the time of a search, for the progress: without an earlier motion, and with it.
+HISTORIES = (2.0, 1.0)
 
 
 def identify_model(
@@ -100,11 +104,14 @@ def _with_history_shown(problem: Problem, method: Search, run: Run) -> Identific
         with_history = replace(record, history=history)
         return search_parameters(replace(problem, records=(with_history,)), method, run)
 
-    fit = virgin = search("virgin")
+    parts = Parts(HISTORIES)
+    with parts.begin(0):
+        fit = virgin = search("virgin")
     # A part of the record may show a drift where the whole of it does not.
     shown = record if fit.drift else replace(record, drift=False)
     for other in earlier_motion(replace(problem, records=(shown,)), fit, run.threads):
         if other.share * virgin.cost < (1.0 - GAIN) * fit.cost:
-            found = search(other.history)
+            with parts.begin(1):
+                found = search(other.history)
             fit = found if found.cost < (1.0 - GAIN) * fit.cost else fit
     return fit

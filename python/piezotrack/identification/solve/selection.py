@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import _core
+from ..._support.display.progress_parts import Parts
 from ..._support.statistics import sample_noise
 from ...errors import DataError, NumericalError
 from ...stages.registry import model_named
@@ -65,6 +66,8 @@ BETTER, BETTER_ON_ONE_LOOP = 0.03, 0.1
 APART_IN_SIZE = 2.0
 # A drive repeats where periods of it differ by less than this share.
 SAME_PERIOD = 0.01
+# Time that a search takes beside that of least squares, for the progress.
+SLOWER = 5.0
 
 
 def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identification:
@@ -102,15 +105,20 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     )
     trials = _Trials(first, methods.of_trials(), run, [rest for _, rest, _ in parts])
     infos = models_tried(problem.records[0].data, problem.parameters)
-    for info in infos:
+    # About how long each takes; the best is fitted once more at the end.
+    shares = Parts([*(SLOWER if info.searched else 1.0 for info in infos), 1.0])
+    for i, info in enumerate(infos):
         if info.searched and trials.least < NEAR_NOISE:
             break
-        if trials.run(info):
+        with shares.begin(i):
+            enough = trials.run(info)
+        if enough:
             break
     if not trials.found:
         raise trials.refused or DataError("no model could be fitted")
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
-    fit = identify_model(problem.of_model(best.info), methods.method(best.info), run)
+    with shares.begin(len(infos)):
+        fit = identify_model(problem.of_model(best.info), methods.method(best.info), run)
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
 
 
