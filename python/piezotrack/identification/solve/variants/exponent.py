@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 __all__ = ["with_exponent_tried"]
 
 MODEL, NAME = "bouc-wen", "exponent"
-# Range of the exponent, the factor from one to the next, and halvings of that about the best.
-LEAST, MOST, STEP, HALVINGS = 1.2, 4.5, 1.3, 3
+# Range of the exponent, and the factor from one to the next.
+LEAST, MOST, STEP = 1.2, 4.5, 1.15
 # Factor beside the best one of a thinned record with which it is found in the whole record.
 BESIDE = 1.03
 # A residual of so many times the noise has nothing but noise in it.
@@ -152,14 +152,6 @@ class _Profile:
             if not cost < before:
                 break
             n, before = n * STEP, cost
-        step = STEP
-        for _ in range(HALVINGS):
-            step = math.sqrt(step)
-            for way in (step, 1.0 / step):
-                at = min(max(n * way, LEAST), MOST)
-                if at not in self.costs and self.descend(n, at) < self.costs[n]:
-                    n = at
-                    break
         self.n = self.vertex(n)
         return self.costs[self.n]
 
@@ -172,7 +164,7 @@ class _Profile:
 
     def vertex(self, n: float) -> float:
         """Return the exponent at the vertex of a parabola through the best one and those beside."""
-        below = max((one for one in self.costs if 1.0 < one < n), default=None)
+        below = max((one for one in self.costs if one < n), default=None)
         above = min((one for one in self.costs if one > n), default=None)
         if below is None or above is None:
             return n
@@ -227,7 +219,7 @@ class _Profile:
             bounds = (max(low, value - NEAR * abs(value)), min(high, value + NEAR * abs(value)))
             if name not in SENSOR and name not in near and bounds[0] < bounds[1]:
                 near[name] = Parameter(bounds=bounds)
-        few = Descents(samples=4, starts=2, rounds=2)
+        few = Descents(samples=2, starts=2, rounds=1)
         found = search(replace(problem, parameters=near), few)
         start = [
             coordinate(found.parameters[name].value, low, high, kind)
