@@ -98,8 +98,9 @@ def made(seed: int) -> Made:
         x = lfilter([1 - held, held - e], [1, -e], x - x[0]) + x[0]
     elif dynamics == 2 and sort == 3:
         wn, zeta = 2 * np.pi * rng.uniform(0.02, 0.2) / dt, 10 ** rng.uniform(-2, -0.3)
-        continuous = ([[0, 1], [-(wn**2), -2 * zeta * wn]], [[0], [wn**2]], [[1, 0]], [[0]])
-        b, a = ss2tf(*cont2discrete(continuous, dt, "foh")[:4])
+        rows = ([[0, 1], [-(wn**2), -2 * zeta * wn]], [[0], [wn**2]], [[1, 0]], [[0]])
+        continuous = tuple(np.array(one, dtype=float) for one in rows)
+        b, a = ss2tf(*(np.asarray(one) for one in cont2discrete(continuous, dt, "foh")[:4]))
         x = lfilter(b[0], a, x - x[0]) + x[0]
     stroke = float(np.ptp(x))
     noise = stroke * 10 ** rng.uniform(-4, -2.8)

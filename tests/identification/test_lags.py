@@ -41,3 +41,28 @@ def test_a_chirp_that_shows_no_mode_is_not_searched_for_one() -> None:
     fit = fitted(2.0 * np.pi * (0.1 * t + 0.4 * t**2), swarm)
     assert not fit.parameters["mass"].free
     assert fit.parameters["damping"].free
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2])
+def test_creep_faster_than_the_drive_is_among_the_alternatives_of_a_lag(share: float) -> None:
+    # The phase that a relaxation of a tenth of a period turns is that of a lag of milliseconds.
+    dt, rng = 1e-3, np.random.default_rng(4)
+    t = dt * np.arange(4000)
+    u = 37.5 * (1.0 - np.cos(2.0 * np.pi * t))
+    stage = replace(STAGE, creep_weights=(0.03,), creep_times=(share,))
+    y = stage.simulate(u, dt).x + 8e-9 * rng.standard_normal(u.size)
+    fit = pt.identify(pt.Dataset(u=u, y=y, dt=dt), "prandtl-ishlinskii", history="virgin")
+    assert fit.lags is None or fit.lags.from_zero
+
+
+def test_a_lag_of_a_stage_that_creeps_has_to_explain_much() -> None:
+    dt, rng = 1e-3, np.random.default_rng(5)
+    t = dt * np.arange(6000)
+    u = 37.5 * (1.0 - np.cos(2.0 * np.pi * t)) * np.exp(-t / 10.0)
+    creeping = replace(STAGE, creep_weights=(0.03, 0.02), creep_times=(0.4, 4.0))
+    noise = 8e-9 * rng.standard_normal(u.size)
+    for stage, lagging in ((creeping, False), (replace(creeping, time_constant=0.02), True)):
+        y = stage.simulate(u, dt).x + noise
+        fit = pt.identify(pt.Dataset(u=u, y=y, dt=dt), "prandtl-ishlinskii")
+        time = fit.model.time_constant
+        assert (time or 0.0) == pytest.approx(0.02 if lagging else 0.0, rel=0.15)

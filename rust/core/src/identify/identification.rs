@@ -5,9 +5,11 @@ use super::cost::residual_sums::Costs;
 use super::cost::several_records::Records;
 use super::descent::lag::{LagRange, lag_range};
 use super::descent::levenberg_marquardt::{LocalRefinement, Sensitivity};
-use super::parameters::candidate::Theta;
+use super::parameters::bounds::measures;
+use super::parameters::candidate::{Point, Theta};
 use super::problem::{Problem, Spec};
 use super::records::record::Record;
+use super::records::thinned::{Thinned, thinning};
 use super::search::descents::{as_low_as, descend};
 use super::search::inertia::with_mass;
 use super::search::plan::{Method, Plan};
@@ -16,7 +18,7 @@ use super::search::swarms::search;
 use crate::error::Result;
 use crate::integrator::Stepping;
 use crate::math::available;
-use crate::signal::{FractionalDelay, Stop};
+use crate::signal::{FractionalDelay, Hold, Stop};
 
 /// An identified stage and how it was found.
 #[derive(Clone, Debug)]
@@ -95,7 +97,17 @@ pub fn identify_together(
             (found?, settings.polish)
         }
         Method::Descents(settings) => {
-            (descend(&local, settings, plan.seed, plan.runs, monitor)?, true)
+            let kept: Vec<Thinned> = each().map(|one| thinned(one.0, one.1)).collect();
+            let few: Vec<Record<'_>> =
+                each().zip(&kept).map(|(one, few)| one.0.thinned(few)).collect();
+            let thin = few.iter().zip(&problems).map(|(one, of)| Evaluator::new(one, of, stop));
+            let thin = Records::new(thin.collect()).kept(monitor.journal());
+            let thin = LocalRefinement { records: &thin, stop };
+            let mut found = descend(&thin, settings, plan.seed, plan.runs, monitor)?;
+            if kept.iter().any(|one| one.every > 1) && !stop() {
+                judge(&mut found, &local);
+            }
+            (found, true)
         }
     };
     let ended = runs.iter().all(|run| run.reason != StopReason::Interrupted);
@@ -146,6 +158,27 @@ pub fn identify_together(
         lags,
         sensitivities,
     })
+}
+
+/// Rows that descents are made on, about.
+const ROWS: usize = 2000;
+
+/// The record with as many samples as descents need where its drive is slow.
+fn thinned(record: &Record<'_>, problem: &Problem) -> Thinned {
+    let Record { drive, y, left_out, .. } = record;
+    let every = thinning(&measures(record), drive.dt, record.window.len(), ROWS);
+    let whole = problem.has_delay() || drive.hold == Hold::Zero;
+    Thinned::of(drive, y, left_out, if whole { 1 } else { every })
+}
+
+/// Costs of runs on all samples.
+fn judge(runs: &mut [Outcome], on: &LocalRefinement<'_>) {
+    let places = runs.iter().map(|run| Point { place: run.place.clone(), limit: f64::INFINITY });
+    let costs = on.records.costs(&places.collect::<Vec<_>>(), on.stop);
+    for (run, costs) in runs.iter_mut().zip(costs) {
+        run.costs = costs;
+        run.evaluations += 1;
+    }
 }
 
 /// Runs that agree with the best one.

@@ -3,8 +3,9 @@
 use core::sync::atomic::{AtomicUsize, Ordering};
 
 use super::weights_record::WeightsRecord;
+use crate::identify::records::thinned::Thinned;
 use crate::models::{AnySuperposition, Model};
-use crate::signal::{Drive, Stop, index, range};
+use crate::signal::{Stop, index, range};
 
 /// Least share of the mean slope that passes without memory: with less the inverse is no use.
 const LEAST_LINEAR: f64 = 1e-3;
@@ -58,9 +59,7 @@ impl<'a> Common<'a> {
         'a: 'b,
     {
         let thin = |(one, kept): (&WeightsRecord<'a>, &'b Thinned)| {
-            let dt = one.drive.dt * index(kept.every);
-            let start = one.start.div_ceil(kept.every);
-            let drive = Drive { u: &kept.u, dt, hold: one.drive.hold };
+            let (drive, start) = (kept.drive(&one.drive), kept.place(one.start));
             WeightsRecord { drive, y: &kept.y, start, left_out: &kept.left_out, ..*one }
         };
         let records: Vec<WeightsRecord<'b>> = self.records.iter().zip(kept).map(thin).collect();
@@ -99,22 +98,6 @@ impl<'a> Common<'a> {
     /// The shortest interval between samples, s.
     pub fn shortest_interval(&self) -> f64 {
         self.records.iter().map(|one| one.drive.dt).fold(f64::INFINITY, f64::min)
-    }
-}
-
-/// Every so many of the samples of a record.
-pub(super) struct Thinned {
-    every: usize,
-    u: Vec<f64>,
-    y: Vec<f64>,
-    left_out: Vec<bool>,
-}
-
-impl Thinned {
-    pub fn of(record: &WeightsRecord<'_>, every: usize) -> Self {
-        let thin = |values: &[f64]| values.iter().copied().step_by(every).collect::<Vec<f64>>();
-        let left_out = record.left_out.iter().copied().step_by(every).collect();
-        Self { every, u: thin(record.drive.u), y: thin(record.y), left_out }
     }
 }
 

@@ -93,6 +93,10 @@ pub(super) const CREEP_GAIN: f64 = 0.015;
 pub(super) const DRIFT_GAIN: f64 = 0.015;
 pub(super) const LAG_GAIN: f64 = 0.01;
 
+/// Share of the deviation that a lag of a stage that creeps has to take away, and one in place of
+/// creep: relaxations faster than the drive's period turn its phase as a lag does.
+pub(super) const LAG_BESIDE_CREEP_GAIN: f64 = 0.05;
+
 /// Share of the deviation that a mode has to take away whose resonance no record shows: it would
 /// also explain some of the creep, or of what the plays do not.
 pub(super) const UNSEEN_GAIN: f64 = 0.15;

@@ -4,3 +4,4 @@ pub(super) mod creep_weights;
 pub(super) mod history;
 pub(super) mod record;
 pub(super) mod resonances;
+pub(super) mod thinned;

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use super::thinned::Thinned;
 use crate::error::{Error, Result, shown};
-use crate::signal::{Drive, Hold, range};
+use crate::signal::{Drive, Hold, index, range};
 
 /// A drive and the displacement measured under it.
 #[derive(Clone, Debug)]
@@ -93,6 +94,18 @@ impl<'a> Record<'a> {
                 record.samples()
             ))),
             _ => Ok(record),
+        }
+    }
+
+    /// The record with every so many of its samples.
+    pub(in crate::identify) fn thinned<'b>(&self, few: &'b Thinned) -> Record<'b> {
+        Record {
+            drive: few.drive(&self.drive),
+            y: &few.y,
+            window: few.place(self.window.start)..few.y.len(),
+            label: self.label.clone(),
+            weight: self.weight * index(few.every),
+            left_out: &few.left_out,
         }
     }
 

@@ -1,11 +1,20 @@
 //! Lag of a fit by least squares: the best one, and the smallest that explains a record as well.
 
-use crate::identify::least_squares::settings::{ROUGH, SAME, STEPS};
+use crate::identify::least_squares::settings::{
+    FIRST_SHARE, LAG_BESIDE_CREEP_GAIN, LAG_GAIN, ROUGH, SAME, STEPS,
+};
 use crate::identify::least_squares::solving::fit::Fit;
 use crate::identify::least_squares::solving::form::Form;
 
 /// Ratio of neighbouring lags that are tried.
 const LAG_SPREAD: f64 = 2.5;
+
+/// Time constants of relaxations that turn the phase of a drive as a lag does, as shares of its
+/// period.
+const FAST_CREEP: [f64; 3] = [0.03, 0.1, 0.3];
+
+/// Least ratio of the time constants of relaxations.
+const SLOWER: f64 = 1.4;
 
 /// Deviation of the lag that is taken, relative to the least.
 const LAG_SAME: f64 = 1.003;
@@ -40,6 +49,32 @@ fn at_lag<'a>(fit: &Fit<'a>, time: f64, steps: usize) -> Option<Fit<'a>> {
     Some(trial)
 }
 
+/// Share of the deviation that a lag has to take away.
+pub(super) fn lag_gain(fit: &Fit<'_>) -> f64 {
+    if fit.times.is_empty() { LAG_GAIN } else { LAG_BESIDE_CREEP_GAIN }
+}
+
+/// Whether a relaxation faster than the drive explains the record nearly as well as a lag.
+pub(super) fn relaxes_as_well(still: &Fit<'_>, lagging: &Fit<'_>) -> Option<bool> {
+    let record = still.common.longest();
+    let period = core::f64::consts::TAU / record.measures().frequency;
+    for time in FAST_CREEP.map(|share| share * period) {
+        let mut trial = still.clone();
+        trial.restructure(|trial| {
+            trial.times.retain(|other| *other > SLOWER * time);
+            trial.times.insert(0, time);
+        });
+        for weight in trial.layout().creep_weights() {
+            trial.x[weight] = FIRST_SHARE;
+        }
+        trial.settle_rigid(STEPS)?;
+        if (1.0 - LAG_BESIDE_CREEP_GAIN) * trial.rms <= lagging.rms {
+            return Some(true);
+        }
+    }
+    Some(false)
+}
+
 /// The fit with the smallest lag that explains the record as well as the best one, and with the range
 /// of such lags.
 pub(super) fn smallest_lag<'a>(mut still: Fit<'a>, best: &Fit<'a>) -> Option<Fit<'a>> {
@@ -64,12 +99,12 @@ pub(super) fn smallest_lag<'a>(mut still: Fit<'a>, best: &Fit<'a>) -> Option<Fit
         }
         Some(low)
     };
-    let low = if still.rms <= enough { 0.0 } else { shortest(enough)? };
-    let least = LAG_SAME / SAME * enough;
-    if still.rms <= least {
-        still.lags = Some((low, high));
+    if (1.0 - lag_gain(&still)) * still.rms <= best.rms {
+        still.lags = Some((0.0, high));
         return Some(still);
     }
+    let low = if still.rms <= enough { 0.0 } else { shortest(enough)? };
+    let least = LAG_SAME / SAME * enough;
     let mut chosen = at_lag(best, shortest(least)?, STEPS)?;
     chosen.held = true;
     chosen.settle(ROUGH)?;

@@ -8,12 +8,12 @@
 //! as Akaike's, would take every part.
 
 use super::histories::{fitted_history, nearer, with_history};
-use super::lag::best_lag;
+use super::lag::{best_lag, lag_gain};
 use super::slow_parts::{creeps, with_drift};
 use super::trials::{Trial, settled_all, with_each};
 use crate::identify::least_squares::settings::{
-    CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, HISTORY_GAIN, LAG_GAIN,
-    MODE_GAIN, ROUGH, Settings, UNSEEN_GAIN,
+    CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, HISTORY_GAIN,
+    LAG_BESIDE_CREEP_GAIN, MODE_GAIN, ROUGH, Settings, UNSEEN_GAIN,
 };
 use crate::identify::least_squares::solving::fit::Fit;
 use crate::identify::least_squares::solving::form::Form;
@@ -31,9 +31,10 @@ const UNSEEN: f64 = 1e-6;
 /// Least gain of a move: less is chance, and the structure of the moves before stays.
 const LEAST_GAIN: f64 = 3e-3;
 
-/// Least gain of a drift in place of creep or the other way round: one explains a record as well as
-/// the other, but goes on otherwise, and which of them foretells a part has been found before.
-const EXCHANGE_GAIN: f64 = 0.05;
+/// Least gain of a drift or a lag in place of creep or the other way round: one explains a record as
+/// well as the other, but goes on otherwise, and which of them foretells a part has been found
+/// before.
+const EXCHANGE_GAIN: f64 = LAG_BESIDE_CREEP_GAIN;
 
 /// Steps of a neighbour, how many of the best are settled, and how far above the cost so far these
 /// may be before.
@@ -76,7 +77,7 @@ impl Refinement<'_> {
         if self.settings.dynamics == DynamicsKind::Auto {
             cost += match fit.form {
                 Form::None => 0.0,
-                Form::First => LAG_GAIN,
+                Form::First => lag_gain(fit),
                 Form::Modes(_) if !self.shown => UNSEEN_GAIN,
                 Form::Modes(1) => MODE_GAIN,
                 Form::Modes(_) => 2.0 * MODE_GAIN,
@@ -167,6 +168,8 @@ impl Refinement<'_> {
                     bare.settle(ROUGH)?;
                     Some(bare)
                 }));
+                // Its time constant anew, beside what has been chosen since.
+                ways.push(Box::new(move || with_drift(&without_drift(from, r), r)));
                 continue;
             }
             ways.push(Box::new(move || with_drift(from, r)));
@@ -304,11 +307,13 @@ fn decades(fit: &Fit<'_>) -> Vec<f64> {
     times
 }
 
-/// Whether one fit has creep where the other has a drift.
+/// Whether one fit has creep where the other has a drift or a lag.
 fn exchanges(fit: &Fit<'_>, other: &Fit<'_>) -> bool {
     let drifts = |of: &Fit<'_>| of.drifts.iter().any(Option::is_some);
+    let lags = |of: &Fit<'_>| of.form == Form::First;
     let creeps = |of: &Fit<'_>| !of.times.is_empty();
-    drifts(fit) != drifts(other) && creeps(fit) != creeps(other)
+    let stands = drifts(fit) != drifts(other) || lags(fit) != lags(other);
+    stands && creeps(fit) != creeps(other)
 }
 
 /// The fit with relaxations of these time constants, s, as good as it gets.

@@ -3,13 +3,13 @@
 //! Each is decided in turn on the least squares so far, and has to earn its place.
 
 use super::histories::{fitted_history, with_history};
-use super::lag::{best_lag, smallest_lag};
+use super::lag::{best_lag, relaxes_as_well, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::nodes::{add_once, choose_nodes, few_or_many, spread};
 use super::refinement::{FIRST_ROUNDS, ROUNDS, Refinement};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
-use crate::identify::least_squares::common::{Common, Thinned};
+use crate::identify::least_squares::common::Common;
 use crate::identify::least_squares::settings::{
     CreepKind, DynamicsKind, FIRST_SHARE, HISTORY_GAIN, MODE_GAIN, NodesKind, ROUGH, SAME, STEPS,
     Settings, Structure, UNSEEN_GAIN,
@@ -19,7 +19,9 @@ use crate::identify::least_squares::solving::form::Form;
 use crate::identify::least_squares::weights_record::WeightsRecord;
 use crate::identify::parameters::drift::DriftKind;
 use crate::identify::records::history::History;
+use crate::identify::records::thinned::{Thinned, thinning};
 use crate::math::least;
+use crate::models::Nodes;
 use crate::signal::index;
 
 /// Rounds over the numbers of an envelope, at most.
@@ -35,20 +37,24 @@ const ABOVE_DRIVE: f64 = 10.0;
 /// Share of the deviation that dead zones in other places have to take away.
 const CORNER_GAIN: f64 = 0.02;
 
-/// Rows that choices are made on, about.
-const ROWS: usize = 4000;
+/// Rows that choices are made on, about; of levels, whose weights are many.
+const ROWS: usize = 2000;
+const ROWS_OF_LEVELS: usize = 4000;
 
-/// Longest interval of a thinned record, as a phase of the drive, rad: its peaks are then known to
-/// a thousandth of the travel.
-const LONGEST_PHASE: f64 = 0.06;
+/// Starts of one history each that are refined: those of least cost.
+const REFINED: usize = 2;
 
 /// The best stage; `None` where stopped.
 pub(in crate::identify::least_squares) fn search<'a>(
     common: &'a Common<'a>,
     settings: &Settings,
 ) -> Option<Fit<'a>> {
-    let kept: Vec<Thinned> =
-        common.records.iter().map(|one| Thinned::of(one, thinning(one))).collect();
+    let rows = rows_of(common);
+    let thin = |one: &WeightsRecord<'_>| {
+        let every = thinning(&one.measures(), one.drive.dt, one.samples(), rows);
+        Thinned::of(&one.drive, one.y, one.left_out, if one.is_delayed() { 1 } else { every })
+    };
+    let kept: Vec<Thinned> = common.records.iter().map(thin).collect();
     let few = common.thinned(&kept);
     let chosen = choose(&few, settings)?;
     common.count(few.evaluations());
@@ -60,14 +66,9 @@ pub(in crate::identify::least_squares) fn search<'a>(
     Some(fit)
 }
 
-/// Every how many samples the choices are made on: where the drive is slow all the time, as many as
-/// leave [`ROWS`].
-fn thinning(record: &WeightsRecord<'_>) -> usize {
-    let of = record.measures();
-    let most = LONGEST_PHASE / (of.frequency * record.drive.dt);
-    let every = record.samples() / ROWS;
-    let few = of.excited().is_none() && index(every) < most && !record.is_delayed();
-    if few { every.max(1) } else { 1 }
+/// Rows that choices are made on.
+fn rows_of(common: &Common<'_>) -> usize {
+    if common.of.nodes() == Nodes::Levels { ROWS_OF_LEVELS } else { ROWS }
 }
 
 /// The structure, on records that may be thinned.
@@ -78,7 +79,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         NodesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
     };
     let mut fit = Fit::new(common, &nodes);
-    let every = |one: &WeightsRecord<'_>| one.samples().div_ceil(ROWS);
+    let every = |one: &WeightsRecord<'_>| one.samples().div_ceil(rows_of(common));
     fit.every = common.records.iter().map(every).collect();
     fit.settle(ROUGH)?;
     search_shape(&mut fit)?;
@@ -98,7 +99,10 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         starts.extend([History::Virgin, History::Settled, History::Fitted].map(Some));
     }
     let begun = with_each(&starts, |history| with_slow_and_late(&fit, settings, mode, *history))?;
-    let found = with_each(&distinct(begun), |start| {
+    let mut begun = distinct(begun);
+    begun.sort_by(|a, b| refinement.cost(a).total_cmp(&refinement.cost(b)));
+    begun.truncate(REFINED);
+    let found = with_each(&begun, |start| {
         let mut trial = start.clone();
         refinement.refine(&mut trial, FIRST_ROUNDS)?;
         Some(trial)
@@ -119,11 +123,16 @@ fn with_range_of_lags<'a>(mut fit: Fit<'a>, settings: &Settings) -> Option<Fit<'
     if settings.dynamics != DynamicsKind::Auto || matches!(fit.form, Form::Modes(_)) {
         return Some(fit);
     }
-    let mut still = fit.clone();
+    let mut still = fit;
     still.set_poles(Form::None, &[]);
     still.settle(ROUGH)?;
     let lagging = best_lag(&still)?;
-    smallest_lag(still, &lagging)
+    let mut chosen = smallest_lag(still.clone(), &lagging)?;
+    let relaxes = settings.creep == CreepKind::Auto && chosen.form == Form::First;
+    if relaxes && relaxes_as_well(&still, &lagging)? {
+        chosen.lags = chosen.lags.map(|(_, longest)| (0.0, longest));
+    }
+    Some(chosen)
 }
 
 /// Fits of different structures, the first of each.

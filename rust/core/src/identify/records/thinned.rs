@@ -1,0 +1,42 @@
+//! Records that are sampled far above what their drive moves, thinned for choices and descents.
+
+use crate::models::Measures;
+use crate::signal::{Drive, index};
+
+/// Longest interval of a thinned record, as a phase of the drive, rad: its peaks are then known to
+/// a thousandth of the travel.
+const LONGEST_PHASE: f64 = 0.06;
+
+/// Every how many samples a record is thinned to: where its drive is slow all the time, as many as
+/// leave so many rows, else 1.
+pub(in crate::identify) fn thinning(of: &Measures, dt: f64, samples: usize, rows: usize) -> usize {
+    let most = LONGEST_PHASE / (of.frequency * dt);
+    let every = samples / rows;
+    if of.excited().is_none() && index(every) < most { every.max(1) } else { 1 }
+}
+
+/// Every so many of the samples of a record.
+pub(in crate::identify) struct Thinned {
+    pub every: usize,
+    u: Vec<f64>,
+    pub y: Vec<f64>,
+    pub left_out: Vec<bool>,
+}
+
+impl Thinned {
+    pub fn of(drive: &Drive<'_>, y: &[f64], left_out: &[bool], every: usize) -> Self {
+        let thin = |values: &[f64]| values.iter().copied().step_by(every).collect::<Vec<f64>>();
+        let left_out = left_out.iter().copied().step_by(every).collect();
+        Self { every, u: thin(drive.u), y: thin(y), left_out }
+    }
+
+    /// Its drive, of a record with this one.
+    pub fn drive(&self, of: &Drive<'_>) -> Drive<'_> {
+        Drive { u: &self.u, dt: of.dt * index(self.every), hold: of.hold }
+    }
+
+    /// A sample of the record in the thinned one, or the next one that is there.
+    pub fn place(&self, sample: usize) -> usize {
+        sample.div_ceil(self.every)
+    }
+}
