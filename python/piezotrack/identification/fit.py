@@ -142,8 +142,9 @@ def identify(
         What the stage went through before the record, whose first sample finds it in equilibrium:
         nothing (``"virgin"``), the drive of the record once or more until the hysteresis repeats
         (``"settled"``), or a voltage that is fitted with the rest, V (``"fit"``), with the creep
-        that it left. Or it was at rest at 0 V until the drive jumped to its first sample within one
-        interval (``"rest"``, of one record), which is then not judged. Where it is not given, what
+        that it left. Or it was at rest, at 0 V or a voltage that is found, until the drive jumped
+        to its first sample within one interval (``"rest"``, of one record), which is then not
+        judged. Where it is not given, what
         the record shows: with more freedom only where that lowers the cost by 2 %.
     method : {"descents", "swarm"}, Descents, ParticleSwarm, LeastSquares or sequence, optional
         What searches: descents from random points until independent ones agree (the default), or
