@@ -62,7 +62,7 @@ class Start:
     ----------
     history : {"virgin", "settled", "fit", "rest"}
         What the stage went through before the record: nothing, the drive of the record, a voltage
-        that was fitted, or rest at 0 V until the drive jumped to its first sample.
+        that was fitted, or rest at a voltage until the drive jumped to its first sample.
     state : StageState
         State at the first sample: in equilibrium, but after such a jump.
     voltage : float or None
@@ -272,25 +272,27 @@ def start_after(
     return Start(history=history, state=state, voltage=voltage, record=fingerprint(data))
 
 
-def start_at_jump(model: Stage, data: Dataset) -> Start:
-    """State at the first sample of a record to which the drive jumped from 0 V within an interval.
+def start_at_jump(model: Stage, data: Dataset, voltage: float = 0.0) -> Start:
+    """State at the first sample of a record to which the drive jumped within an interval.
 
     Parameters
     ----------
     model : Stage
-        The stage, at rest at 0 V before.
+        The stage, at rest before.
     data : Dataset
         The record.
+    voltage : float, optional
+        Voltage at which it was at rest [V].
 
     Returns
     -------
     Start
         The start, not in equilibrium.
     """
-    drive = [0.0, float(data.full.u[0])]
-    rest = model.equilibrium(0.0)
+    drive = [voltage, float(data.full.u[0])]
+    rest = model.equilibrium(voltage)
     state = model.simulate(drive, data.dt, hold=data.hold, initial=rest).final
-    return Start(history="rest", state=state, voltage=0.0, record=fingerprint(data))
+    return Start(history="rest", state=state, voltage=voltage, record=fingerprint(data))
 
 
 def _repeating(model: Any, data: Dataset, state: Any) -> StageState:
