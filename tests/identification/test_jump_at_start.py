@@ -27,10 +27,11 @@ STAGE = pt.PrandtlIshlinskiiStage(
 T = DT * np.arange(4000)
 
 
-def jumping(hold: Hold = "foh") -> pt.Dataset:
-    """A triangle from 20 V, to which the stage came from rest at 0 V within one interval."""
+def jumping(hold: Hold = "foh", before: float = 0.0) -> pt.Dataset:
+    """A triangle from 20 V, to which the stage came from rest within one interval."""
     u = 20.0 + 110.0 * np.abs((T + 0.5) % 1.0 - 0.5)
-    x = STAGE.simulate(np.concatenate(([0.0], u)), DT, hold=hold).x[1:]
+    rest = STAGE.equilibrium(before)
+    x = STAGE.simulate(np.concatenate(([before], u)), DT, hold=hold, initial=rest).x[1:]
     return pt.Dataset(
         u=u, y=x + NOISE * np.random.default_rng(0).normal(size=u.size), dt=DT, hold=hold
     )
@@ -56,6 +57,14 @@ def test_a_stage_at_rest_before_the_drive_jumped_is_known(hold: Hold, tmp_path: 
     assert again.score(fit.data).rms == pytest.approx(fit.cost, rel=1e-6)
     named = pt.identify(log, "prandtl-ishlinskii", history="rest", progress=False)
     assert named.cost == pytest.approx(fit.cost, rel=1e-6)
+
+
+def test_the_voltage_of_rest_is_found() -> None:
+    fit = pt.identify(jumping(before=90.0), "prandtl-ishlinskii", progress=False)
+    assert fit.start is not None
+    assert fit.start.history == "rest"
+    assert fit.start.voltage == pytest.approx(90.0, abs=2.0)
+    assert fit.cost < 1.1 * NOISE
 
 
 def test_a_searched_model_begins_at_rest_too() -> None:

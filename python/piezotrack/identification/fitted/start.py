@@ -62,7 +62,7 @@ class Start:
     ----------
     history : {"virgin", "settled", "fit", "rest"}
         What the stage went through before the record: nothing, the drive of the record, a voltage
-        that was fitted, or rest at 0 V until the drive jumped to its first sample.
+        that was fitted, or rest at a voltage until the drive jumped to its first sample.
     state : StageState
         State at the first sample: in equilibrium, but after such a jump.
     voltage : float or None
@@ -186,19 +186,19 @@ def start_of(entry: Any, state: type[StageState]) -> Start | None:
     ParameterError
         The entry is not that of a start.
     """
-    found = object_of("start", entry)
-    if not found:
+    start = object_of("start", entry)
+    if not start:
         return None
-    begun = state_of("start: state", found["state"], state)
-    history = checked_history(found["history"])
+    begun = state_of("start: state", start["state"], state)
+    history = checked_history(start["history"])
     if history is None:
         raise ParameterError("start: history", "None", "'virgin', 'settled' or 'fit'")
-    volts = found["voltage"]["value"]
+    volts = start["voltage"]["value"]
     return Start(
         history=history,
         state=begun,
         voltage=None if volts is None else _core.as_number("start: voltage", volts),
-        record=text_of("start: record", found["record"]) or "",
+        record=text_of("start: record", start["record"]) or "",
     )
 
 
@@ -272,25 +272,27 @@ def start_after(
     return Start(history=history, state=state, voltage=voltage, record=fingerprint(data))
 
 
-def start_at_jump(model: Stage, data: Dataset) -> Start:
-    """State at the first sample of a record to which the drive jumped from 0 V within an interval.
+def start_at_jump(model: Stage, data: Dataset, voltage: float = 0.0) -> Start:
+    """State at the first sample of a record to which the drive jumped within an interval.
 
     Parameters
     ----------
     model : Stage
-        The stage, at rest at 0 V before.
+        The stage, at rest before.
     data : Dataset
         The record.
+    voltage : float, optional
+        Voltage at which it was at rest [V].
 
     Returns
     -------
     Start
         The start, not in equilibrium.
     """
-    drive = [0.0, float(data.full.u[0])]
-    rest = model.equilibrium(0.0)
+    drive = [voltage, float(data.full.u[0])]
+    rest = model.equilibrium(voltage)
     state = model.simulate(drive, data.dt, hold=data.hold, initial=rest).final
-    return Start(history="rest", state=state, voltage=0.0, record=fingerprint(data))
+    return Start(history="rest", state=state, voltage=voltage, record=fingerprint(data))
 
 
 def _repeating(model: Any, data: Dataset, state: Any) -> StageState:
@@ -429,11 +431,11 @@ class _Search:
                 columns += [np.exp(-t / time) for time in np.array(self.model.creep_times)[used]]
         if columns:
             basis = np.stack(columns, axis=1)
-            found = np.linalg.lstsq(basis, rest, rcond=1e-10)[0]
-            rest = rest - basis @ found
+            weighted = np.linalg.lstsq(basis, rest, rcond=1e-10)[0]
+            rest = rest - basis @ weighted
             if used.any():
                 moved = np.zeros(weights.size)
                 with np.errstate(over="ignore"):
-                    moved[used] = found[-int(used.sum()) :] / weights[used]
+                    moved[used] = weighted[-int(used.sum()) :] / weights[used]
                 start = replace(start, state=_moved(start.state, weights, moved))
         return start, float(np.sqrt(np.mean(rest**2)))

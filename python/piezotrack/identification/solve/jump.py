@@ -1,4 +1,4 @@
-"""A record whose drive jumps to its first sample from rest at 0 V, as loggers that start late."""
+"""A record whose drive jumps to its first sample from rest, as loggers that start late show."""
 
 from __future__ import annotations
 
@@ -15,21 +15,25 @@ from ..fitted.start import GAIN, start_at_jump
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from ...data.dataset import Dataset
     from ..fitted.identification import Identification
     from ..problem.problem import Problem
-    from ..problem.records import Record
 
 __all__ = ["with_rest", "with_rest_tried"]
 
-# A drive that begins nearer to 0 than by this share of its range does not jump.
-LEAST_JUMP = 0.02
+# Voltages of rest with a fit each, those that a fit is judged with, and sections in which the best
+# one is refined.
+COARSE, GRID, SECTIONS = 9, 33, 16
+# Fits with a voltage of rest that was found from the one before, at most.
+ROUNDS = 3
 
 
 def with_rest_tried(
     problem: Problem, fit: Identification, identify: Callable[[Problem], Identification]
 ) -> Identification:
-    """Try that the stage was at rest at 0 V where the first samples carry the residual.
+    """Try that the stage was at rest before where the first samples carry the residual.
 
     Parameters
     ----------
@@ -48,19 +52,19 @@ def with_rest_tried(
     """
     (record,) = problem.records
     data = record.data
-    if record.history is not None or data.warmup or not _may_jump(data):
+    if record.history is not None or data.warmup:
         return fit
-    run = fit.simulate(data, offset=fit.offset)
-    if not carried_by_first_samples(data.counted(data.y - run.x)):
+    if not carried_by_first_samples(_left(fit, data)):
         return fit
     jumped = with_rest(problem, identify)
-    left = jumped.data.counted(fit.simulate(jumped.data, offset=fit.offset).x - jumped.data.y)
-    before = float(np.sqrt(np.mean(left**2)))
+    before = float(np.sqrt(np.mean(_left(fit, jumped.data) ** 2)))
     return jumped if jumped.cost < (1.0 - GAIN) * before else fit
 
 
 def with_rest(problem: Problem, identify: Callable[[Problem], Identification]) -> Identification:
-    """Identify a stage that was at rest at 0 V until the drive jumped to the first sample.
+    """Identify a stage that was at rest until the drive jumped to the first sample.
+
+    At rest at 0 V, or at another voltage where that lowers the residual by 2 %.
 
     Parameters
     ----------
@@ -82,23 +86,81 @@ def with_rest(problem: Problem, identify: Callable[[Problem], Identification]) -
     """
     if len(problem.records) > 1:
         raise ParameterError("history", "'rest'", "another one of several records")
+    data = problem.records[0].data
+    fit = _at_rest(problem, identify, 0.0)
+    if carried_by_first_samples(_left(fit, fit.data)):
+        low, high = _voltages(data)
+        others = [_at_rest(problem, identify, float(v)) for v in np.linspace(low, high, COARSE)]
+        best = min(others, key=lambda other: other.cost)
+        fit = best if best.cost < (1.0 - GAIN) * fit.cost else fit
+    for _ in range(ROUNDS):
+        volts = best_voltage(fit, data)
+        if volts is None:
+            break
+        other = _at_rest(problem, identify, volts)
+        if other.cost >= (1.0 - GAIN) * fit.cost:
+            break
+        fit = other
+    return fit
+
+
+def best_voltage(fit: Identification, data: Dataset) -> float | None:
+    """Return the voltage of rest with which a model explains a record best.
+
+    Parameters
+    ----------
+    fit : Identification
+        The model, and the voltage of rest that it was fitted with.
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    float or None
+        The voltage [V]; None where none lowers the residual by 2 %.
+    """
+
+    def cost(volts: float) -> float:
+        state = start_at_jump(fit.model, data, volts).state
+        run = fit.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
+        left = data.counted(data.y - run.x[data.warmup :])[1:]
+        return float(np.std(left) if fit.offset_fitted else np.sqrt(np.mean(left**2)))
+
+    grid = np.linspace(*_voltages(data), GRID)
+    best = int(np.argmin([cost(float(volts)) for volts in grid]))
+    left, right = float(grid[max(best - 1, 0)]), float(grid[min(best + 1, GRID - 1)])
+    share = (5.0**0.5 - 1.0) / 2.0
+    for _ in range(SECTIONS):
+        inner = (right - share * (right - left), left + share * (right - left))
+        left, right = (left, inner[1]) if cost(inner[0]) < cost(inner[1]) else (inner[0], right)
+    volts = 0.5 * (left + right)
+    known = fit.start.voltage if fit.start and fit.start.voltage is not None else 0.0
+    return volts if cost(volts) < (1.0 - GAIN) * cost(known) else None
+
+
+def _left(fit: Identification, data: Dataset) -> NDArray[np.float64]:
+    """Return the residual of a model on its record, or on a part of it [m]."""
+    return data.counted(data.y - fit.simulate(data, offset=fit.offset).x)
+
+
+def _voltages(data: Dataset) -> tuple[float, float]:
+    """Return the range of the voltages that a stage may have been at [V]."""
+    low, high = float(data.full.u.min()), float(data.full.u.max())
+    reach = 0.5 * (high - low)
+    return min(low - reach, 0.0), max(high + reach, 0.0)
+
+
+def _at_rest(
+    problem: Problem, identify: Callable[[Problem], Identification], volts: float
+) -> Identification:
     (record,) = problem.records
     data = record.data
-    fit = identify(replace(problem, records=(_at_rest_before(record),)))
+    before = data._preceded(volts)
+    begin = before.t[0] if data.warmup else before.full.t[2]
+    preceded = replace(record, data=before[float(begin) :], history="virgin")
+    fit = identify(replace(problem, records=(preceded,)))
     judged = data if data.warmup else data[float(data.t[1]) :]
-    start = start_at_jump(fit.model, data)
+    start = start_at_jump(fit.model, data, volts)
     own = replace(fit.records[0], data=judged, start=start, origin=origin_of(judged))
     known = {**fit.details, "provenance": {**fit.details["provenance"], **provenance(judged)}}
     return replace(fit, data=judged, records=(own,), start=start, details=known)
-
-
-def _may_jump(data: Dataset) -> bool:
-    low, high = float(data.u.min()), float(data.u.max())
-    return abs(float(data.u[0])) > LEAST_JUMP * (high - low)
-
-
-def _at_rest_before(record: Record) -> Record:
-    """Put a sample of 0 V before a record, which is warm-up as its first one is."""
-    before = record.data._preceded(0.0)
-    begin = before.t[0] if record.data.warmup else before.full.t[2]
-    return replace(record, data=before[float(begin) :], history="virgin")

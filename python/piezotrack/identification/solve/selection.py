@@ -47,6 +47,9 @@ LEAST_SQUARES = (
     "duhem",
 )
 SEARCHED = ("first-order-dahl", "parallel-dahl", "bouc-wen")
+# Models that contain another one, whose search costs less: tried where it is near the best.
+CONTAINED = {"parallel-dahl": "first-order-dahl"}
+NEAR_BEST = 1.5
 OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
 # Share of the window that is fitted, and turns of the drive that each part needs; and the share
 # where it turns too seldom.
@@ -110,6 +113,8 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     for i, info in enumerate(infos):
         if info.searched and trials.least < NEAR_NOISE:
             break
+        if not trials.near_best(CONTAINED.get(info.name)):
+            continue
         with shares.begin(i):
             enough = trials.run(info)
         if enough:
@@ -148,6 +153,11 @@ class _Trials:
     least: float = math.inf
     # Structure of the first fit by least squares.
     start: Structure | None = None
+
+    def near_best(self, name: str | None) -> bool:
+        """Return whether a model, if it was tried, comes near the best one."""
+        rms = {tried.info.name: tried.trial.rms for tried in self.found}
+        return name not in rms or rms[name] <= NEAR_BEST * min(rms.values())
 
     def run(self, info: ModelInfo) -> bool:
         """Try a model; return whether it leaves nothing but noise."""
