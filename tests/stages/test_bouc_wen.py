@@ -304,6 +304,32 @@ def test_identification_with_another_exponent() -> None:
     assert fit.model.beta == pytest.approx(TRUE["beta"] * 1e5, rel=1e-3)
 
 
+@pytest.mark.parametrize("exponent", [1.5, 2.0])
+def test_an_exponent_is_fitted(tmp_path: Path, exponent: float) -> None:
+    """Where the record shows one other than 1; another motion is then foretold."""
+    noise = 0.05e-6
+    data = log(noise, exponent)
+    fit = pt.identify(data, "bouc-wen", history="virgin", method=pt.Descents(seed=1))
+    assert fit.model.exponent == pytest.approx(exponent, rel=0.02)
+    assert fit.parameters["exponent"].free
+    assert fit.cost < 1.05 * noise
+    t = np.arange(2000) * 2e-3
+    size = 1e-5 ** (1 - exponent)
+    scaled = TRUE | {"beta": TRUE["beta"] * size, "gamma": TRUE["gamma"] * size}
+    u = 30.0 * (1.0 - np.cos(5.0 * t)) * np.exp(-0.3 * t)
+    y = pt.BoucWenStage(**scaled, exponent=exponent).simulate(u, 2e-3).x
+    assert fit.score(pt.Dataset(u=u, y=y, dt=2e-3)).rms < 0.3 * noise
+    assert pt.load(fit.save(tmp_path / "exponent.json")).model == fit.model
+
+
+def test_an_exponent_is_held_at_what_is_given() -> None:
+    """The result is that of a search with the exponent 1, whose record shows none or not."""
+    for data, known in ((log(0.05e-6, 2.0), {"exponent": 1.0}), (log(0.05e-6), {})):
+        fit = pt.identify(data, "bouc-wen", parameters=known, method=pt.Descents(seed=1))
+        assert fit.model.exponent == 1.0
+        assert not fit.parameters["exponent"].free
+
+
 def test_a_result_can_be_read_saved_and_loaded(tmp_path: Path) -> None:
     fit = identified()
     text = fit.summary()

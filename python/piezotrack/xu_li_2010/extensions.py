@@ -275,9 +275,10 @@ def rivals(data: Dataset) -> dict[str, Any]:
         "threads": 1,
         "progress": False,
     }
-    name, bouc_wen = "Bouc-Wen", identify(data, "bouc-wen", **free)
+    name = "Bouc-Wen"
+    bouc_wen = identify(data, "bouc-wen", parameters={"exponent": 1.0}, **free)
     if abs(bouc_wen.model.gamma) > bouc_wen.model.beta:
         # Not passive, and therefore without an inverse.
         name = "Bouc-Wen, gamma held at 0 to have an inverse"
-        bouc_wen = identify(data, "bouc-wen", parameters={"gamma": 0.0}, **free)
+        bouc_wen = identify(data, "bouc-wen", parameters={"gamma": 0.0, "exponent": 1.0}, **free)
     return {name: bouc_wen, "Prandtl-Ishlinskii": plays}

@@ -14,6 +14,7 @@ from .earlier_motion import earlier_motion
 from .jump import with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
+from .variants.exponent import with_exponent_tried
 from .weights import solve_least_squares
 
 if TYPE_CHECKING:
@@ -73,9 +74,15 @@ def _identify(
         return _weights(problem, method, run, start)
     if len(problem.records) > 1:
         return search_several_records(problem, method, run)
+
+    def search(other: Problem, by: Search | None) -> Identification:
+        return search_parameters(other, by or method, run)
+
     if problem.records[0].history is not None:
-        return search_parameters(problem, method, run)
-    return _with_history_shown(problem, method, run)
+        fit = search(problem, None)
+    else:
+        fit = _with_history_shown(problem, method, run)
+    return with_exponent_tried(problem, fit, search, run.threads)
 
 
 def _weights(

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..problem.records import Record
     from .run import Run
 
-__all__ = ["search_parameters"]
+__all__ = ["SENSOR", "details_of", "search_parameters"]
 
 # Independent swarms by default: a swarm has to be restarted to tell whether it converged.
 SWARMS = 4
@@ -116,12 +116,12 @@ def _identification(
     constraints = tuple(Constraint(*one) for one in found.constraints)
     details: dict[str, Any] = {
         "parameters": {
-            parameter.name: _details(parameters[parameter.name])
+            parameter.name: details_of(parameters[parameter.name])
             for parameter in info.parameters
             if parameter.name in parameters
         }
         | {"creep_weights": {"free": True}, "creep_times": {"free": False}},
-        "delay": _details(parameters["delay"]) if "delay" in parameters else {},
+        "delay": details_of(parameters["delay"]) if "delay" in parameters else {},
         **constraint_entries(constraints),
         "fit": {
             **fit_entry(found.rms, data, found.rms_with_priors, spread),
@@ -211,7 +211,7 @@ def _fitted(
     )
 
 
-def _details(estimate: Estimate) -> dict[str, Any]:
+def details_of(estimate: Estimate) -> dict[str, Any]:
     """Entries of the file for a parameter; JSON has no infinity."""
     known = estimate.deviation is not None and math.isfinite(estimate.deviation)
     return {

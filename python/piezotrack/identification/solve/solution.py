@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..problem.problem import AUTO
-from .between_samples import with_interpolation_tried
 from .one_model import identify_model
 from .selection import identify_best
+from .variants.between_samples import with_interpolation_tried
 
 if TYPE_CHECKING:
     from ..fitted.identification import Identification

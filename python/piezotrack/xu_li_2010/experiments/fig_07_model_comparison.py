@@ -28,6 +28,7 @@ def judge(log: Dataset, fit: Identification, seed: int, *, every: int = 10) -> C
     bouc_wen = identify(
         thinned(log, every)[:FITTED_SECONDS],
         "bouc-wen",
+        parameters={"exponent": 1.0},
         history="virgin",
         method=Descents(seed=seed, runs=4),
         threads=1,

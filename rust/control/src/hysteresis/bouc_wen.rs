@@ -221,16 +221,22 @@ impl Bend {
     #[inline(never)]
     fn advance(self, mut z: f64, length: f64) -> f64 {
         let mut left = length;
+        // The rate at the limit that z tends to, on one side of 0.
+        let mut limit = (0.0, 0.0);
         for _ in 0..MOST_SHORT_PIECES {
             let side = if z + 1e-12 * self.rise * left < 0.0 { -1.0 } else { 1.0 };
             let kappa = self.beta + side * self.gamma;
-            // The rate where |z| is largest: here, or at the limit that it tends to.
-            let here = kappa.abs() * libm::pow(z.abs(), self.n - 1.0);
-            let share = 1.0 / self.n;
-            let limit = libm::pow(self.rise.abs(), 1.0 - share) * libm::pow(kappa.abs(), share);
-            let longest = SHORT_PIECE / (self.n * here.max(limit));
+            let power = libm::pow(z.abs(), self.n - 1.0);
+            // The rate where |z| is largest: here, or at the limit.
+            let here = kappa.abs() * power;
+            if limit.0 * side <= 0.0 {
+                let share = 1.0 / self.n;
+                let rate = libm::pow(self.rise.abs(), 1.0 - share);
+                limit = (side, rate * libm::pow(kappa.abs(), share));
+            }
+            let longest = SHORT_PIECE / (self.n * here.max(limit.1));
             let more = if left < longest { left } else { longest };
-            z = self.piece(z, more, side, kappa);
+            z = self.piece((z, power), more, side, kappa);
             left -= more;
             // Written so that NaN ends the loop too.
             if left.partial_cmp(&0.0) != Some(Ordering::Greater) {
@@ -242,8 +248,9 @@ impl Bend {
         if (self.slope(z, kappa) * left).abs() <= 1e-4 * z.abs() { z } else { f64::INFINITY }
     }
 
-    fn piece(self, z: f64, length: f64, side: f64, kappa: f64) -> f64 {
-        let end = self.runge_kutta(z, length, kappa);
+    /// One step from `z`, whose power of n - 1 is known.
+    fn piece(self, (z, power): (f64, f64), length: f64, side: f64, kappa: f64) -> f64 {
+        let end = self.runge_kutta((z, power), length, kappa);
         if side * end >= 0.0 {
             return end;
         }
@@ -253,11 +260,12 @@ impl Bend {
             + 32.0 * (slowness(0.75) + slowness(0.25))
             + 12.0 * slowness(0.5);
         let rest = length + z * sum / 90.0;
-        self.runge_kutta(0.0, rest, self.beta - side * self.gamma)
+        // n is above 1: the power of 0 is 0.
+        self.runge_kutta((0.0, 0.0), rest, self.beta - side * self.gamma)
     }
 
-    fn runge_kutta(self, z: f64, length: f64, kappa: f64) -> f64 {
-        let k1 = self.slope(z, kappa);
+    fn runge_kutta(self, (z, power): (f64, f64), length: f64, kappa: f64) -> f64 {
+        let k1 = self.rise - kappa * z * power;
         let k2 = self.slope(z + 0.5 * length * k1, kappa);
         let k3 = self.slope(z + 0.5 * length * k2, kappa);
         let k4 = self.slope(z + length * k3, kappa);

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ...data.checks.fast_drive import is_fast
-from ..fitted.model_entries import origin_of
-from ..fitted.start import GAIN, fingerprint
+from ....data.checks.fast_drive import is_fast
+from ...fitted.model_entries import origin_of
+from ...fitted.start import GAIN, fingerprint
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..fitted.fitted_record import FittedRecord
-    from ..fitted.identification import Identification
-    from ..problem.problem import Problem
-    from ..problem.records import Record
+    from ...fitted.fitted_record import FittedRecord
+    from ...fitted.identification import Identification
+    from ...problem.problem import Problem
+    from ...problem.records import Record
 
 __all__ = ["with_interpolation_tried"]
 

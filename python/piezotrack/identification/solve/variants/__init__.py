@@ -1,0 +1,1 @@
+"""Variants of a fit, tried beside it: a drive interpolated, another exponent."""

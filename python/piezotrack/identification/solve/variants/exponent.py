@@ -1,0 +1,272 @@
+"""Exponent of a Bouc-Wen stage, fitted where the record shows that it is not 1."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ....data.checks.diagnostics import jumps
+from ....data.dataset import Dataset
+from ...fitted.start import GAIN
+from ...methods.descents import Descents
+from ...problem.objective import Objective
+from ...problem.parameter import Parameter
+from ..search import SENSOR, details_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from ...fitted.identification import Identification
+    from ...problem.problem import Problem
+
+    Array = NDArray[np.float64]
+
+__all__ = ["with_exponent_tried"]
+
+MODEL, NAME = "bouc-wen", "exponent"
+# Range of the exponent, and the factor from one to the next.
+LEAST, MOST, STEP = 1.2, 4.5, 1.15
+# Factor beside the best one of a thinned record with which it is found in the whole record.
+BESIDE = 1.03
+# A residual of so many times the noise has nothing but noise in it.
+NOISY = 1.05
+# Parameters whose unit the exponent decides.
+DECAYS = ("beta", "gamma")
+# Most samples of a record, of one that is thinned, and fewest; and the distance of the drive from
+# straight lines between those that are kept, as a share of its range.
+MOST_SAMPLES, MOST_THINNED, FEWEST, OFF = 20_000, 6000, 500, 1e-4
+# Share of a parameter within which the last search stays, and by how much its cost may be above
+# that of the profile.
+NEAR, WORSE = 0.5, 0.02
+
+
+def with_exponent_tried(
+    problem: Problem,
+    fit: Identification,
+    search: Callable[[Problem, Descents | None], Identification],
+    threads: int,
+) -> Identification:
+    """Try exponents other than 1, from the fit with 1.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    fit : Identification
+        Its result with the exponent 1.
+    search : callable
+        What solves a problem by a search, by its own method or by another.
+    threads : int
+        All cores where it is 0.
+
+    Returns
+    -------
+    Identification
+        The one with the best exponent where that lowers the cost by 2 %.
+    """
+    if not _is_free(problem) or fit.start is None or fit.start.history == "rest":
+        return fit
+    if len(problem.records) > 1 or jumps(problem.records[0].data.full.u):
+        return fit
+    if fit.cost <= max(NOISY * fit.noises[0], 1e-9 * fit.stroke):
+        return fit
+    (record,) = problem.records
+    thin = _thinned(record.data)
+    if thin is None:
+        return fit
+    history = fit.start.history
+    few = replace(problem, records=(replace(record, data=thin, history=history),))
+    profile = _Profile(few, fit, threads)
+    cost = profile.best()
+    # The thinned record has costs of its own.
+    if not cost < (1.0 - GAIN) * profile.costs[1.0]:
+        return fit
+    whole = replace(problem, records=(replace(record, history=history),))
+    found = profile.finished(whole, search)
+    if not found.cost < (1.0 - GAIN) * fit.cost:
+        return fit
+    origin = fit.details["provenance"]
+    details = {**found.details, "provenance": origin}
+    return replace(found, method=fit.method, nfev=fit.nfev + found.nfev, details=details)
+
+
+def _is_free(problem: Problem) -> bool:
+    """Whether nothing is said that goes with an exponent of 1."""
+    given = problem.parameters
+    return (
+        problem.model == MODEL
+        and not problem.constraints
+        and not any(name in given for name in (NAME, *DECAYS))
+        and all(one.prior is None and one.tie is None for one in given.values())
+    )
+
+
+def _thinned(data: Dataset) -> Dataset | None:
+    """Keep every so many of the samples, as straight lines between them allow; None of too many."""
+    u, swing = data.full.u, float(np.ptp(data.full.u))
+    if len(u) > MOST_SAMPLES or data.left_out is not None:
+        return data if len(u) <= MOST_THINNED else None
+    places = np.arange(u.size)
+    every = 1
+    while data.hold == "foh" and u.size // (every + 1) >= FEWEST:
+        kept = np.interp(places, places[:: every + 1], u[:: every + 1])
+        if float(np.abs(kept - u)[: u.size - every - 1].max()) > OFF * swing:
+            break
+        every += 1
+    if u.size // every > MOST_THINNED:
+        return None
+    if every == 1:
+        return data
+    full = data.full
+    thin = Dataset(u=u[::every], y=full.y[::every], t=full.t[::every], drive_unit=data.drive_unit)
+    return thin[float(thin.t[-(-data.warmup // every)]) :]
+
+
+class _Profile:
+    """Least cost over the exponent, and where it lies."""
+
+    def __init__(self, problem: Problem, fit: Identification, threads: int) -> None:
+        self.problem, self.threads = problem, threads
+        values = {name: one.value for name, one in fit.parameters.items()}
+        run = fit.simulate(problem.records[0].data)
+        # At this size the branches of two exponents decay alike.
+        self.size = float(np.abs(run.hysteresis).max())
+        self.values: dict[float, dict[str, float]] = {1.0: values}
+        self.costs: dict[float, float] = {}
+        self.n = 1.0
+        self.descend(1.0, 1.0)
+
+    def best(self) -> float:
+        """Find the best exponent; return its cost."""
+        n = LEAST
+        before = self.descend(1.0, n)
+        if not before < self.costs[1.0]:
+            return before
+        while n * STEP <= MOST:
+            cost = self.descend(n, n * STEP)
+            if not cost < before:
+                break
+            n, before = n * STEP, cost
+        self.n = self.vertex(n)
+        return self.costs[self.n]
+
+    def refined(self, problem: Problem) -> None:
+        """Find the best exponent of the whole record beside that of the thinned one."""
+        n, self.problem, self.costs = self.n, problem, {}
+        for at in (n, n / BESIDE, n * BESIDE):
+            self.descend(n, min(at, MOST))
+        self.n = self.vertex(min(self.costs, key=self.costs.__getitem__))
+
+    def vertex(self, n: float) -> float:
+        """Return the exponent at the vertex of a parabola through the best one and those beside."""
+        below = max((one for one in self.costs if one < n), default=None)
+        above = min((one for one in self.costs if one > n), default=None)
+        if below is None or above is None:
+            return n
+        squares = [self.costs[one] ** 2 for one in (below, n, above)]
+        curve = np.polyfit(np.array([below, n, above]) - n, squares, 2)
+        if not curve[0] > 0.0:
+            return n
+        at = n - float(curve[1]) / (2.0 * float(curve[0]))
+        if not below < at < above or self.descend(n, at) > self.costs[n]:
+            return n
+        return at
+
+    def descend(self, start: float, n: float) -> float:
+        """Descend with the exponent `n` from where that with another one ended; return the cost."""
+        objective = Objective._of(held(self.problem, n), self.threads)
+        scale = self.size ** (start - n)
+        known = {
+            name: value * (scale if name in DECAYS else 1.0)
+            for name, value in self.values[start].items()
+        }
+        place = [
+            coordinate(known[name], low, high, kind)
+            for name, low, high, kind in objective.coordinates
+        ]
+        places, costs, _ = objective.descend(place)
+        free = {
+            name: value_at(part, low, high, kind)
+            for part, (name, low, high, kind) in zip(places[0], objective.coordinates, strict=True)
+        }
+        self.values[n], self.costs[n] = {**known, **free}, float(costs[0])
+        return self.costs[n]
+
+    def deviation(self, samples: int) -> float:
+        """Return the standard deviation of the exponent from the curvature of the profile."""
+        beside = [n for n in self.costs if n != 1.0 and abs(n - self.n) < 0.3 * self.n]
+        if len(beside) < 3:
+            return math.inf
+        squares = np.array([self.costs[n] ** 2 for n in beside])
+        curve = float(np.polyfit(np.array(beside) - self.n, squares, 2)[0])
+        return self.costs[self.n] / math.sqrt(curve * samples) if curve > 0.0 else math.inf
+
+    def finished(
+        self, problem: Problem, search: Callable[[Problem, Descents | None], Identification]
+    ) -> Identification:
+        """Search the whole record with the best exponent, near the parameters of the profile."""
+        self.refined(problem)
+        problem = held(problem, self.n)
+        objective = Objective._of(problem, self.threads)
+        near = dict(problem.parameters)
+        for name, low, high, _ in objective.coordinates:
+            value = self.values[self.n][name]
+            bounds = (max(low, value - NEAR * abs(value)), min(high, value + NEAR * abs(value)))
+            if name not in SENSOR and name not in near and bounds[0] < bounds[1]:
+                near[name] = Parameter(bounds=bounds)
+        few = Descents(samples=2, starts=2, rounds=1)
+        found = search(replace(problem, parameters=near), few)
+        start = [
+            coordinate(found.parameters[name].value, low, high, kind)
+            for name, low, high, kind in objective.coordinates
+        ]
+        # What ends on a narrow bound, or beside the minimum, is searched as all others are.
+        lowest = float(objective.descend(start)[1][0])
+        if found.cost > (1.0 + WORSE) * lowest:
+            found = search(problem, None)
+        return self.described(found, objective)
+
+    def described(self, found: Identification, objective: Objective) -> Identification:
+        """Describe the exponent as fitted, and the ranges of the others as those of a search."""
+        parameters = dict(found.parameters)
+        for name, low, high, _ in objective.coordinates:
+            one = parameters[name]
+            at_bound = not low < one.value < high
+            parameters[name] = one._replace(bounds=(low, high), at_bound=at_bound)
+        spread = self.deviation(found.data.counted(found.data.y).size)
+        parameters[NAME] = parameters[NAME]._replace(
+            free=True,
+            bounds=(1.0, MOST),
+            deviation=spread,
+            at_bound=self.n >= MOST,
+        )
+        entries = dict(found.details["parameters"])
+        for name in set(entries) & set(parameters):
+            entries[name] = details_of(parameters[name])
+        return replace(
+            found, parameters=parameters, details={**found.details, "parameters": entries}
+        )
+
+
+def held(problem: Problem, n: float) -> Problem:
+    """Hold the exponent of a problem."""
+    return replace(problem, parameters={**problem.parameters, NAME: Parameter(n)})
+
+
+def coordinate(value: float, low: float, high: float, scale: str) -> float:
+    """Return the coordinate of a value in the unit box, the nearest to one outside."""
+    if scale == "log" and value > 0.0:
+        low, high, value = math.log(low), math.log(high), math.log(value)
+    return min(max((value - low) / (high - low), 0.0), 1.0)
+
+
+def value_at(part: float, low: float, high: float, scale: str) -> float:
+    """Return the value at a coordinate of the unit box."""
+    if scale == "log":
+        return float(low * (high / low) ** part)
+    return float(low + part * (high - low))
