@@ -284,12 +284,12 @@ class ScpiDevice:
         message = buffer.fetch.format(count=volts.size)
         answer = self._link.ask(message, readings=volts.size)
         self._check_errors()
-        found = answer.split(",")
-        if len(found) != volts.size:
+        readings = answer.split(",")
+        if len(readings) != volts.size:
             raise self._unexpected(
-                message, f"{len(found)} readings, {answer}", f"{volts.size} readings"
+                message, f"{len(readings)} readings, {answer}", f"{volts.size} readings"
             )
-        return np.array([self._number(message, one) for one in found])
+        return np.array([self._number(message, one) for one in readings])
 
     def _number(self, message: str, answer: str) -> float:
         try:

@@ -175,11 +175,11 @@ class Benchmark(Result):
         ParameterError
             There is no such record.
         """
-        found = [one for one in self.results if one.record == record]
-        if not found:
+        results = [one for one in self.results if one.record == record]
+        if not results:
             known = ", ".join(map(repr, dict.fromkeys(one.record for one in self.results)))
             raise ParameterError("record", quoted(record), f"one of {known}")
-        return sorted(found, key=lambda one: one.judged.rms if one.judged else math.inf)
+        return sorted(results, key=lambda one: one.judged.rms if one.judged else math.inf)
 
     @property
     def records(self) -> list[str]:
@@ -312,7 +312,7 @@ def benchmark(
         for contender in contenders
         if models is not None or contender.suits(record)
     ]
-    found = []
+    results = []
     with ProgressBar(progress, "benchmark") as bar:
         for done, (record, contender) in enumerate(pairs):
             document = None
@@ -323,8 +323,8 @@ def benchmark(
                 document = json_ready(result_of(contender, record))
                 if kept is not None:
                     kept.store(record, contender, document)
-            found.append(_read(document, record, contender))
-    return Benchmark(results=tuple(found))
+            results.append(_read(document, record, contender))
+    return Benchmark(results=tuple(results))
 
 
 def _number(value: object) -> float:
@@ -349,12 +349,12 @@ def _read(
         chosen=document.get("chosen") or "",
         parts=tuple(
             PartScore(
-                part=one["part"],
-                rms=_number(one["rms_m"]),
-                max_error=_number(one["max_error_m"]),
-                rms_percent=_number(one["rms_percent"]),
+                part=part["part"],
+                rms=_number(part["rms_m"]),
+                max_error=_number(part["max_error_m"]),
+                rms_percent=_number(part["rms_percent"]),
             )
-            for one in document.get("parts") or ()
+            for part in document.get("parts") or ()
         ),
         inverse=None
         if inverse is None

@@ -72,19 +72,19 @@ class BoardFolder:
             reason = (error.strerror or str(error)).lower()
             raise DataError(f"{file} cannot be read: {reason}") from None
         try:
-            found = parse_json(file.name, content)
+            document = parse_json(file.name, content)
         except DataError:
             # Nobody but a failing disk or an editor has written that: it is computed again.
             return None
         same = (
-            isinstance(found, dict)
-            and found.get("format") == FORMAT
-            and found.get("schema_version") == SCHEMA_VERSION
-            and isinstance(found.get("record"), dict)
-            and found["record"].get("key") == record.key
-            and (found.get("error") is not None or isinstance(found.get("parts"), list))
+            isinstance(document, dict)
+            and document.get("format") == FORMAT
+            and document.get("schema_version") == SCHEMA_VERSION
+            and isinstance(document.get("record"), dict)
+            and document["record"].get("key") == record.key
+            and (document.get("error") is not None or isinstance(document.get("parts"), list))
         )
-        return found if same else None
+        return document if same else None
 
     def store(
         self, record: BenchmarkRecord, contender: Contender, document: Mapping[str, Any]

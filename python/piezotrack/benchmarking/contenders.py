@@ -34,19 +34,19 @@ def listed_contenders() -> dict[str, Contender]:
     dict of str to Contender
         A name that is taken gets that of its package too.
     """
-    found = {one.name: one for one in (*own_contenders(), *simple_contenders())}
+    contenders = {one.name: one for one in (*own_contenders(), *simple_contenders())}
     for entry in sorted(entry_points(group=GROUP), key=lambda entry: (entry.name, entry.value)):
         package = entry.dist.name if entry.dist else entry.module
         name = _plain(entry.name)
-        if name in found:
+        if name in contenders:
             name = _plain(f"{package}-{entry.name}")
-        found[name] = Contender(
+        contenders[name] = Contender(
             name=name,
             title=f"{entry.name} ({package})",
             fit=partial(_fit, name, entry),
             suits=lambda _: True,
         )
-    return found
+    return contenders
 
 
 def contenders_named(names: Iterable[str] | None) -> list[Contender]:

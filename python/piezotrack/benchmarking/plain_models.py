@@ -54,18 +54,18 @@ class _Plain:
     def _called(self, function: Callable[[Array, float], Any], values: Array, dt: float) -> Array:
         """Call a function, and refuse what is not as many finite numbers."""
         try:
-            found = np.asarray(function(values.copy(), dt), dtype=np.float64)
+            x = np.asarray(function(values.copy(), dt), dtype=np.float64)
         except Exception as error:
             # Code of others, which may raise anything.
             raise DataError(f"{self.name} failed: {type(error).__name__}: {error}") from error
-        if found.shape != values.shape:
+        if x.shape != values.shape:
             raise DataError(
-                f"{self.name} returned an array of shape {found.shape}: expected {values.shape}, "
+                f"{self.name} returned an array of shape {x.shape}: expected {values.shape}, "
                 "as that of its argument"
             )
-        if not np.isfinite(found).all():
+        if not np.isfinite(x).all():
             raise DataError(f"{self.name} returned values that are not finite numbers")
-        return found
+        return x
 
 
 def contender_of(name: str, title: str, function: object) -> Contender:
@@ -108,11 +108,11 @@ def _arguments(function: object) -> int | None:
     if not callable(function):
         return None
     try:
-        found = inspect.signature(function).parameters.values()
+        parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
         return None
     by_place = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return sum(one.kind in by_place and one.default is one.empty for one in found)
+    return sum(one.kind in by_place and one.default is one.empty for one in parameters)
 
 
 def _fitted(name: str, fit: Callable[[Array, Array, float], Any], data: Dataset) -> _Plain:

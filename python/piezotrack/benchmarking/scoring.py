@@ -92,11 +92,15 @@ def _figures(fitted: Fitted, record: BenchmarkRecord, seconds: float) -> dict[st
 
 def _against_truth(fitted: Fitted, record: BenchmarkRecord) -> dict[str, Any]:
     """Parameters beside those of the stage that made the record."""
-    found = fitted.parameters
-    if not record.truth or not record.truth.keys() <= found.keys():
+    parameters = fitted.parameters
+    if not record.truth or not record.truth.keys() <= parameters.keys():
         return {}
     return {
-        name: {"true": true, "found": found[name], "percent": 100.0 * (found[name] / true - 1.0)}
+        name: {
+            "true": true,
+            "found": parameters[name],
+            "percent": 100.0 * (parameters[name] / true - 1.0),
+        }
         for name, true in record.truth.items()
     }
 
@@ -108,12 +112,12 @@ def _inverse(fitted: Fitted, record: BenchmarkRecord) -> dict[str, Any]:
         name, data = "fitted", record.fitted
     wanted = _smoothed(data)
     try:
-        found = fitted.invert(data, wanted)
+        inverse = fitted.invert(data, wanted)
     except PiezotrackError as error:
         return {"part": name, "error": str(error)}
-    if found is None:
+    if inverse is None:
         return {"part": name, "error": "it has no inverse"}
-    u, x = (values[data.warmup :] for values in found)
+    u, x = (values[data.warmup :] for values in inverse)
     there, away = x - wanted[data.warmup :], u - data.u
     if record.own_offsets:
         away = away - np.mean(away)

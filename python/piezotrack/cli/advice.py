@@ -63,12 +63,12 @@ ARGUMENT = re.compile(r"(?<![\w'(?{&,])(?<!has )(?<!--unit )(\w+)=(?!\.)(?:True\
 command_at_work: ContextVar[Callable[..., Any] | None] = ContextVar("_command", default=None)
 
 
-def as_options(said: object) -> str:
+def as_options(error: object) -> str:
     """Say in options what the library says in arguments.
 
     Parameters
     ----------
-    said : PiezotrackError or str
+    error : PiezotrackError or str
         An error, a remark or a table.
 
     Returns
@@ -88,7 +88,7 @@ def as_options(said: object) -> str:
         option = _option(match[1])
         return f"{option} {match[2] or ''}" if option in known else match[0]
 
-    text, argument = str(said), getattr(said, "argument", None) or ""
+    text, argument = str(error), getattr(error, "argument", None) or ""
     if (option := _option(argument)) in known:
         text = re.sub(rf"(^|: ){re.escape(argument)}(?=[ [])", rf"\1{option}", text, count=1)
     if not known & {"--displacement", "--drive"}:

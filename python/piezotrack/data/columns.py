@@ -160,12 +160,12 @@ class Columns(list[Column]):
         for role in missing:
             if role == "time":
                 _check_lengths(list(roles.values()))
-            found = self._candidates(role, taken={column.index for column in roles.values()})
+            columns = self._candidates(role, taken={column.index for column in roles.values()})
             groups = {column.group for column in roles.values()}
-            if len(found) > 1 and len(groups) == 1:
-                found = [column for column in found if column.group in groups] or found
-            if len(found) == 1 or role != "time" or needs_time:
-                roles[role] = self._only(found, role)
+            if len(columns) > 1 and len(groups) == 1:
+                columns = [column for column in columns if column.group in groups] or columns
+            if len(columns) == 1 or role != "time" or needs_time:
+                roles[role] = self._only(columns, role)
         roles = {role: roles[role] for role in wanted if role in roles}
         if len({column.index for column in roles.values()}) < len(roles):
             raise ParameterError(
@@ -194,24 +194,24 @@ class Columns(list[Column]):
 
     def _find(self, key: str | int, argument: str) -> Column:
         """Return the column that the caller names by its title, its name or its number."""
-        found: list[Column] = []
+        columns: list[Column] = []
         if isinstance(key, Integral) and not isinstance(key, bool):
-            found = [column for column in self if column.index == key]
+            columns = [column for column in self if column.index == key]
         elif isinstance(key, str):
             text = key.strip()
-            found = (
+            columns = (
                 [column for column in self if text and text == column.keys[0]]
                 or [column for column in self if text and text == column.keys[1]]
                 or [column for column in self if text and text == column.keys[2]]
                 or [column for column in self if text and text == column.keys[3]]
                 or [c for c in self if text and text.lower() in map(str.lower, c.keys)]
             )
-        if len(found) == 1:
-            return found[0]
-        problem = "is the name of several columns" if found else "is not a column"
-        there = self._nearest(str(key), found or self)
+        if len(columns) == 1:
+            return columns[0]
+        problem = "is the name of several columns" if columns else "is not a column"
+        there = self._nearest(str(key), columns or self)
         names = _titles(there) if self.has_titles else f"0 to {len(self) - 1}, without titles"
-        those = "they" if found else "the columns"
+        those = "they" if columns else "the columns"
         words = f"{argument}: {quoted(key)} {problem}; {those} are {names}"
         raise ParameterError(words, argument=argument)
 
@@ -228,7 +228,7 @@ class Columns(list[Column]):
 
     def _candidates(self, role: str, taken: set[int]) -> list[Column]:
         """Return the columns with a usual name for `role`, those whose unit fits if there are."""
-        found, fitting, positions = [], [], []
+        candidates, fitting, positions = [], [], []
         for column in self:
             name, unit = _plain(column.name), lookup(column.unit)
             fits = unit is not None and unit.quantity == QUANTITIES[role][0]
@@ -238,18 +238,18 @@ class Columns(list[Column]):
                 positions.append(column)
             # Without a unit, v is as likely a velocity.
             if name in NAMES[role] and (fits or name != "v"):
-                found.append(column)
+                candidates.append(column)
                 if fits or unit is None:
                     fitting.append(column)
-        return fitting or positions or found
+        return fitting or positions or candidates
 
-    def _only(self, found: Sequence[Column], role: str) -> Column:
-        if len(found) == 1:
-            return found[0]
+    def _only(self, columns: Sequence[Column], role: str) -> Column:
+        if len(columns) == 1:
+            return columns[0]
         if not self.has_titles:
             raise DataError(BY_NUMBER)
-        if found:
-            several = f"several columns could be the {role}: {_titles(found)}"
+        if columns:
+            several = f"several columns could be the {role}: {_titles(columns)}"
             raise DataError(f"{several}; choose one with {role}=")
         instead = ", or give the sampling interval with dt=" if role == "time" else ""
         nothing = f"no column is known to be the {role}: name it with {role}={instead}"

@@ -210,7 +210,7 @@ def _departures(y: Array, length: int) -> Array:
 
     Of several the least; 0 where they are off to different sides, and at the ends.
     """
-    found = np.zeros(y.size)
+    departures = np.zeros(y.size)
     inner = y.size - length - 3
     before = y[:inner], y[1 : 1 + inner]
     after = y[2 + length : 2 + length + inner], y[3 + length : 3 + length + inner]
@@ -218,8 +218,8 @@ def _departures(y: Array, length: int) -> Array:
     apart = [y[2 + i : 2 + i + inner] - part for i, part in enumerate(parts)]
     same = np.sign(apart[0])
     least = np.min([same * one for one in apart], axis=0) if length > 1 else np.abs(apart[0])
-    found[2 : 2 + inner] = same * np.maximum(least, 0.0)
-    return found
+    departures[2 : 2 + inner] = same * np.maximum(least, 0.0)
+    return departures
 
 
 def _cubic(a: Any, b: Any, c: Any, d: Any, length: int) -> list[Any]:

@@ -259,15 +259,17 @@ class Log:
             if dt is not None:
                 check_dt(dt)
             needs_time = dt is None and not self._may_state()
-            found = self.columns.roles(wanted, units, needs_time=needs_time, checks_time=needs_time)
-        others = [column for role, column in found.items() if role != "time"]
+            columns = self.columns.roles(
+                wanted, units, needs_time=needs_time, checks_time=needs_time
+            )
+        others = [column for role, column in columns.items() if role != "time"]
         if dt is not None or needs_time:
-            return found
+            return columns
         stated = self.table.interval(others)
-        time = found.get("time")
+        time = columns.get("time")
         usable = time is not None and lookup(time.unit) is not None
         if wanted.get("time") is None and stated is not None and not usable:
-            return {role: column for role, column in found.items() if role != "time"}
+            return {role: column for role, column in columns.items() if role != "time"}
         with self.source.named(self.table.header):
             return self.columns.roles(wanted, units, needs_time=True)
 

@@ -39,10 +39,10 @@ class Options:
 
     def text(self, name: str, default: str | None = None) -> str:
         """Return a text; where there is no default it has to be given."""
-        found = self._left.pop(name, None) or default
-        if found is None:
+        value = self._left.pop(name, None) or default
+        if value is None:
             raise ParameterError("device", f"no {name}", self._form, verb="has")
-        return found
+        return value
 
     def optional(self, name: str) -> str | None:
         """Return a text, or None."""
@@ -98,10 +98,10 @@ class Options:
         text = self.text(name)
         form = f"{quantity}, as in LOW..HIGH with its unit" if join else f"{quantity} with its unit"
         try:
-            numbers, found, mark = numbers_with_unit(text)
+            numbers, unit, mark = numbers_with_unit(text)
         except ParameterError as error:
             raise self._wrong(name, text, form, error) from None
-        if found != quantity or mark != join:
+        if unit != quantity or mark != join:
             raise self._wrong(name, text, form, None)
         return numbers
 

@@ -153,7 +153,7 @@ def play_paced(
     exchange(float(table[0]))
     sleep(not_negative("lead_in", lead_in, "s"))
     start, worst, delayed = clock(), 0.0, 0
-    for k, one in enumerate(table):
+    for k, voltage in enumerate(table):
         due = start + k / rate
         if (wait := due - clock()) > 0.0:
             sleep(wait)
@@ -166,7 +166,7 @@ def play_paced(
                 "expected a lower rate, or a device with a buffer"
             )
         worst = max(worst, late)
-        reading = exchange(float(one))
+        reading = exchange(float(voltage))
         times.append(clock() - began)
         if late <= 0.5 / rate:
             readings[k] = reading

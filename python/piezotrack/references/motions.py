@@ -302,7 +302,7 @@ def extremes(
 def _extremes(motion: Motion, duration: float, step: float) -> tuple[float, float]:
     grid = np.linspace(0.0, duration, math.ceil(duration / step) + 1)
     x = motion(grid)[0]
-    found = [float(x.min()), float(x.max())]
+    extremes = [float(x.min()), float(x.max())]
     for k, sign in enumerate((-1.0, 1.0)):
         inner = sign * x[1:-1]
         t = grid[1:-1][(inner >= sign * x[:-2]) & (inner >= sign * x[2:])]
@@ -311,8 +311,8 @@ def _extremes(motion: Motion, duration: float, step: float) -> tuple[float, floa
             move = np.divide(-v, a, out=np.zeros(t.shape), where=sign * a < 0.0)
             t = np.clip(t + np.clip(move, -step, step), 0.0, duration)
         if t.size:
-            found[k] = sign * max(sign * found[k], float((sign * motion(t)[0]).max()))
-    return found[0], found[1]
+            extremes[k] = sign * max(sign * extremes[k], float((sign * motion(t)[0]).max()))
+    return extremes[0], extremes[1]
 
 
 def schroeder_phases(amplitudes: Array) -> Array:

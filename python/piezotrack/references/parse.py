@@ -285,24 +285,24 @@ def numbers_with_unit(text: str) -> tuple[list[float], str, str]:
     if "..." in text:
         raise ParameterError(quoted(text), "three dots", "two, as in 0..110um", verb="has")
     join = next((mark for mark in ("..", "/") if mark in text), "")
-    found = []
+    values = []
     for part in text.split(join) if join else [text]:
         match = _VALUE.fullmatch(part.strip())
         if match is None:
             raise ParameterError(
                 f"{quoted(part.strip())} in {quoted(text)} is not a number with its unit"
             )
-        found.append((float(match[1]), match[2]))
-    if join == ".." and len(found) != 2:
+        values.append((float(match[1]), match[2]))
+    if join == ".." and len(values) != 2:
         raise ParameterError(
-            quoted(text), f"{len(found)} values", "two, as in 0..110um", verb="has"
+            quoted(text), f"{len(values)} values", "two, as in 0..110um", verb="has"
         )
     # The last unit counts for the values before it that have none.
-    units = [_unit(name or found[-1][1]) for _, name in found]
+    units = [_unit(name or values[-1][1]) for _, name in values]
     if len({unit.quantity for unit in units}) > 1:
         raise ParameterError(f"{quoted(text)} mixes {units[0].name} and {units[-1].name}")
     numbers = [
-        number * unit.factor / unit.divisor for (number, _), unit in zip(found, units, strict=True)
+        number * unit.factor / unit.divisor for (number, _), unit in zip(values, units, strict=True)
     ]
     if units[0] is PLAIN:
         numbers = [int(number) if number.is_integer() else number for number in numbers]

@@ -77,10 +77,10 @@ class XYReference:
             if not isinstance(axis, Reference):
                 raise ParameterError(name, type(axis).__name__, "pt.Reference")
         for name in ("duration", "period", "ramp"):
-            one, other = getattr(self.x, name), getattr(self.y, name)
-            if one != other:
+            of_x, other = getattr(self.x, name), getattr(self.y, name)
+            if of_x != other:
                 raise ParameterError(
-                    f"{name} of y", f"{other} s", f"that of x, {one} s, as both are one path"
+                    f"{name} of y", f"{other} s", f"that of x, {of_x} s, as both are one path"
                 )
         if (self.radius is None) != (self.centre is None):
             raise ParameterError("radius or centre", "missing", "both of a circle, or neither")

@@ -19,17 +19,17 @@ NOT_A_SENSOR = 1e-3
 
 def _as_numbers(part: object) -> None:
     """Take the fields of a part as numbers, `limits` as two and `seed` as a count."""
-    for one in fields(part):  # type: ignore[arg-type]
-        value: Any = getattr(part, one.name)
-        if one.name == "limits":
-            value = one_or_more_numbers(one.name, value)
+    for field in fields(part):  # type: ignore[arg-type]
+        value: Any = getattr(part, field.name)
+        if field.name == "limits":
+            value = one_or_more_numbers(field.name, value)
             if len(value) != 2:
                 raise ParameterError("limits", value, "(low, high) in V", verb="are")
-        elif one.name == "seed":
-            value = _core.as_count(one.name, value)
+        elif field.name == "seed":
+            value = _core.as_count(field.name, value)
         else:
-            value = _core.as_number(one.name, value)
-        object.__setattr__(part, one.name, value)
+            value = _core.as_number(field.name, value)
+        object.__setattr__(part, field.name, value)
 
 
 @dataclass(frozen=True, kw_only=True)

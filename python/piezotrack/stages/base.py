@@ -75,13 +75,13 @@ class Stage:
         return _stage_text(self)
 
     def __post_init__(self) -> None:
-        for one in self.info.parameters:
-            value = getattr(self, one.name)
-            if one.is_list:
-                value = as_numbers(one.name, value)
-            elif not (one.is_optional and value is None):
-                value = _core.as_number(one.name, value)
-            object.__setattr__(self, one.name, value)
+        for parameter in self.info.parameters:
+            value = getattr(self, parameter.name)
+            if parameter.is_list:
+                value = as_numbers(parameter.name, value)
+            elif not (parameter.is_optional and value is None):
+                value = _core.as_number(parameter.name, value)
+            object.__setattr__(self, parameter.name, value)
         # The core checks the ranges.
         _ = self._core
 

@@ -73,12 +73,12 @@ class ModelInfo:
     def hysteresis(self) -> tuple[str, ...]:
         """Parameters of the hysteresis of a model that are searched by default."""
         return tuple(
-            one.name
-            for one in self.parameters
+            parameter.name
+            for parameter in self.parameters
             if self.searched
-            and one.default is None
-            and not one.is_list
-            and one.name not in MECHANICS
+            and parameter.default is None
+            and not parameter.is_list
+            and parameter.name not in MECHANICS
         )
 
     @property

@@ -214,7 +214,7 @@ class VirtualStage:
         >>> pt.VirtualStage.of(stage, noise=5e-9, bandwidth=500.0, mode=(160.0, 0.065))
         <VirtualStage, Prandtl-Ishlinskii, amplifier 500 Hz, noise 5 nm rms>
         """
-        model, offset, own = stage, 0.0, 0.0
+        model, offset, known_delay = stage, 0.0, 0.0
         if not isinstance(stage, Stage):
             if not (isinstance(stage, _Identified) and isinstance(stage.model, Stage)):
                 raise ParameterError(
@@ -222,7 +222,7 @@ class VirtualStage:
                     type(stage).__name__,
                     "an identified model, or a stage of a model, as a pt.DahlStage",
                 )
-            model, offset, own = stage.model, stage.offset, stage.delay
+            model, offset, known_delay = stage.model, stage.offset, stage.delay
         assert isinstance(model, Stage)
         if creep is not None:
             model = _creeping(model, creep)
@@ -235,7 +235,7 @@ class VirtualStage:
                 noise=noise,
                 noise_bandwidth=noise_bandwidth,
                 resolution=resolution,
-                delay=own if delay is None else delay,
+                delay=known_delay if delay is None else delay,
                 offset=offset,
                 seed=seed,
             ),

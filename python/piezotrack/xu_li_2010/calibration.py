@@ -85,11 +85,11 @@ def cost(values: Mapping[str, float]) -> float:
     cannot be reached does not dominate. A number within a bound costs nothing.
     """
     terms = []
-    for one in observables():
-        if one.calibrated and one.key in values:
-            off = values[one.key] - one.published
-            off = max(off, 0.0) if one.kind == "bound" else off
-            power = (off / one.slack) ** 4
+    for target in observables():
+        if target.calibrated and target.key in values:
+            off = values[target.key] - target.published
+            off = max(off, 0.0) if target.kind == "bound" else off
+            power = (off / target.slack) ** 4
             terms.append(power / (1.0 + power))
     return math.fsum(terms) / len(terms)
 
@@ -231,13 +231,13 @@ def _document(theta: dict[str, float], how: str, provenance: dict[str, Any]) -> 
     used = [one for one in observables() if one.calibrated and one.key in values]
     free = [
         {
-            "name": one.name,
-            "meaning": one.meaning,
-            "bounds": [one.low, one.high],
-            "value": theta[one.name],
-            "moves": _moved(theta, one, values, seeds),
+            "name": parameter.name,
+            "meaning": parameter.meaning,
+            "bounds": [parameter.low, parameter.high],
+            "value": theta[parameter.name],
+            "moves": _moved(theta, parameter, values, seeds),
         }
-        for one in FREE
+        for parameter in FREE
     ]
     return {
         "format": "piezotrack-calibration",

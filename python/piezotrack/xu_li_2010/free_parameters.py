@@ -114,30 +114,30 @@ def apparatus_at(theta: Mapping[str, float]) -> Apparatus:
 
 def _axis(theta: Mapping[str, float], axis: str, end: float) -> VirtualStage:
     known = VirtualStage.xu_li_2010()
-    own = {key.removesuffix(f"_{axis}"): value for key, value in theta.items()}
+    of_axis = {key.removesuffix(f"_{axis}"): value for key, value in theta.items()}
     # Of unit gain, in um.
     trial = replace(
         known,
-        stage=_plays(own, 1e-6),
+        stage=_plays(of_axis, 1e-6),
         amplifier=replace(known.amplifier, bandwidth=theta["bandwidth"], slew=theta["slew"]),
         sensor=replace(known.sensor, noise_bandwidth=theta["noise_bandwidth"]),
         step=STEP,
     )
-    return replace(trial, stage=_plays(own, 1e-6 * end / _end(trial)))
+    return replace(trial, stage=_plays(of_axis, 1e-6 * end / _end(trial)))
 
 
-def _plays(own: Mapping[str, float], gain: float) -> PrandtlIshlinskiiStage:
+def _plays(theta: Mapping[str, float], gain: float) -> PrandtlIshlinskiiStage:
     """Make plays, creep and mode of an axis, of a mean gain [m/V]."""
     known = VirtualStage.xu_li_2010()
     assert isinstance(known.stage, PrandtlIshlinskiiStage)
     assert known.preconditioning is not None
     swing = known.preconditioning.swing
-    places = own["reach"] * np.array(known.stage.thresholds)
+    places = theta["reach"] * np.array(known.stage.thresholds)
     # In the middle of a settled swing the branches of a play are min(2 r, swing - 2 r) apart, and
     # its output travels swing - 2 r: the widest loop is `share`, the mean slope 1.
-    shape = (places / places.max()) ** own["slope"]
+    shape = (places / places.max()) ** theta["slope"]
     weights = (
-        own["share"]
+        theta["share"]
         * swing
         * shape
         / float(np.sum(shape * np.minimum(2 * places, swing - 2 * places)))
@@ -148,11 +148,11 @@ def _plays(own: Mapping[str, float], gain: float) -> PrandtlIshlinskiiStage:
         thresholds=tuple(places),
         weights=tuple(gain * weights),
         dead_zone_thresholds=(gain * swing / 3.0, gain * 2.0 * swing / 3.0),
-        dead_zone_weights=(own["bend"], own["top"]),
-        creep_weights=(own["creep_fast"], own["creep_1s"], own["creep_10s"]),
-        creep_times=(own["creep_fast_time"], 1.0, 10.0),
-        frequency=own["frequency"],
-        damping_ratio=own["damping_ratio"],
+        dead_zone_weights=(theta["bend"], theta["top"]),
+        creep_weights=(theta["creep_fast"], theta["creep_1s"], theta["creep_10s"]),
+        creep_times=(theta["creep_fast_time"], 1.0, 10.0),
+        frequency=theta["frequency"],
+        damping_ratio=theta["damping_ratio"],
     )
 
 

@@ -126,17 +126,17 @@ def drives(folder: str | os.PathLike[str]) -> Drives:
     training = read(where / "training.csv")[FITTED[0] : FITTED[1]]
     file = where / "tracking.csv"
     log, wanted = read(file), read_reference(file)
-    asked = wanted.sample(log.dt).x
-    if len(log) < COMPENSATED + 2 * CHANGE or asked.size != len(log):
+    reached = wanted.sample(log.dt).x
+    if len(log) < COMPENSATED + 2 * CHANGE or reached.size != len(log):
         raise DataError(
             f"{file.name} has {len(log)} rows: expected those of the log, more than "
             f"{COMPENSATED + 2 * CHANGE}, each with a reference"
         )
     part = slice(COMPENSATED + CHANGE, None)
     # Reference and sensor have different zeros.
-    asked = asked + float(np.mean((log.y - asked)[part]))
-    reference = Reference.from_samples(asked, log.dt, name=file.name)
-    desired, measured = asked[part], log.u[part]
+    reached = reached + float(np.mean((log.y - reached)[part]))
+    reference = Reference.from_samples(reached, log.dt, name=file.name)
+    desired, measured = reached[part], log.u[part]
     slope, level = np.polyfit(desired, measured, 1)
     line = float(slope) * desired + float(level)
     computed, fits, shifts = {}, {}, {}

@@ -136,22 +136,22 @@ class Obtained:
 
     def document(self) -> dict[str, Any]:
         """Content of the JSON file, in the unit of the observable."""
-        one, unit = self.observable, SI[self.observable.unit]
+        observable, unit = self.observable, SI[self.observable.unit]
         low, high = self.quartiles
         return {
-            "key": one.key,
-            "figure": one.figure,
-            "name": one.name,
-            "unit": one.unit or "1",
-            "published": one.published / unit,
-            "kind": one.kind,
-            "calibrated": one.calibrated,
-            "use": one.use,
-            "how": one.how,
+            "key": observable.key,
+            "figure": observable.figure,
+            "name": observable.name,
+            "unit": observable.unit or "1",
+            "published": observable.published / unit,
+            "kind": observable.kind,
+            "calibrated": observable.calibrated,
+            "use": observable.use,
+            "how": observable.how,
             "median": self.median / unit,
             "quartiles": [low / unit, high / unit],
             "ratio": self.ratio,
-            "slack": one.slack / unit,
+            "slack": observable.slack / unit,
             "reached": self.reached,
             "values": [value / unit for value in self.values],
         }

@@ -124,12 +124,12 @@ class Reproduction(Result):
             "observables": entries,
             "conclusions": [
                 {
-                    "text": one.text,
-                    "holds": one.holds,
-                    "seeds": [one.seen, one.seeds],
-                    "seen": one.words,
+                    "text": conclusion.text,
+                    "holds": conclusion.holds,
+                    "seeds": [conclusion.seen, conclusion.seeds],
+                    "seen": conclusion.words,
                 }
-                for one in self.conclusions
+                for conclusion in self.conclusions
             ],
             "beyond": [one.document() for one in self.sections],
             "apparatus": self.apparatus.document(),
@@ -249,9 +249,9 @@ def _scored(
         experiments = run_experiments(apparatus, seed)
         return experiments.values, experiments.true_values
 
-    found = []
+    runs = []
     with two_threads() as pool:
         for one in one_by_one(pool, score, seeds):
-            found.append(one)
-            bar.step(1 + len(found), 1 + len(seeds), f"{1 + len(seeds)} seeds")
-    return found
+            runs.append(one)
+            bar.step(1 + len(runs), 1 + len(seeds), f"{1 + len(seeds)} seeds")
+    return runs

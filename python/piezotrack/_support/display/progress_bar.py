@@ -50,7 +50,7 @@ class _Clock:
         """Seconds until the next line is due."""
         return max(0.0, self._due - time.monotonic())
 
-    def said(self) -> None:
+    def postpone(self) -> None:
         """Put the next line off."""
         self._due = time.monotonic() + EVERY
 
@@ -193,4 +193,4 @@ class _Words:
             # Nobody may be there to read it any more.
             with suppress(OSError, ValueError):
                 print(", ".join(filter(None, parts)), file=self._stream, flush=True)
-            self._clock.said()
+            self._clock.postpone()

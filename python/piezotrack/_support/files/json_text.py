@@ -35,12 +35,12 @@ def parse_json(name: str, content: bytes) -> Any:
     """
 
     def once(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        members: dict[str, Any] = {}
         for key, value in pairs:
-            if key in found:
+            if key in members:
                 raise DataError(f"{name}: the entry '{key}' is there twice: expected it once")
-            found[key] = value
-        return found
+            members[key] = value
+        return members
 
     try:
         return json.loads(content.decode("utf-8-sig"), object_pairs_hook=once)

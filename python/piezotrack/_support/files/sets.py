@@ -134,46 +134,46 @@ def finish_others(folder: Path) -> None:
         sweep(folder, {temporary.name for temporary, _ in _listed(folder)})
 
 
-def _rename(folder: Path, own: Sequence[Pair]) -> None:
+def _rename(folder: Path, pairs: Sequence[Pair]) -> None:
     """Rename own files, and before them those of a run that was killed while it did so."""
-    for _, file in own:
+    for _, file in pairs:
         if file.is_dir():
             raise DataError(f"{file} cannot be written: it is a folder")
     marker = folder / MARKER
     interruption: BaseException | None = None
     with _one_at_a_time:
         try:
-            others = _take(marker, own)
+            others = _take(marker, pairs)
         except BaseException:
             # Nothing has been put in place, and what was to be is removed.
-            if _is_ours(marker) and {file for _, file in _listed(folder)} <= {f for _, f in own}:
+            if _is_ours(marker) and {file for _, file in _listed(folder)} <= {f for _, f in pairs}:
                 marker.unlink(missing_ok=True)
             raise
         try:
-            failed = _move(others, own)
+            failed = _move(others, pairs)
         except BaseException as error:
             # It waits for the few that are left.
-            interruption, failed = error, _move(others, own)
+            interruption, failed = error, _move(others, pairs)
         if failed:
             # Without room for a shorter list, the longer one stays.
             with suppress(OSError):
-                _write(marker, [pair for pair in (*others, *own) if pair[1] in failed])
+                _write(marker, [pair for pair in (*others, *pairs) if pair[1] in failed])
         else:
             marker.unlink(missing_ok=True)
     if interruption is not None:
         raise interruption
-    for _, file in own:
+    for _, file in pairs:
         if file in failed:
             reason = (failed[file].strerror or str(failed[file])).lower()
             raise DataError(f"{file} cannot be written: {reason}; {MARKER} lists what is older")
 
 
-def _take(marker: Path, own: Sequence[Pair]) -> list[Pair]:
+def _take(marker: Path, pairs: Sequence[Pair]) -> list[Pair]:
     """Set the marker, and return the files that a killed run has not renamed."""
     start = time.monotonic()
     while True:
         try:
-            _write(marker, own, exclusive=True)
+            _write(marker, pairs, exclusive=True)
         except FileExistsError:
             # The run that set it is renaming now, or was killed.
             if _owner_is_gone(marker) or time.monotonic() - start > PATIENCE:
@@ -182,16 +182,16 @@ def _take(marker: Path, own: Sequence[Pair]) -> list[Pair]:
         else:
             return []
     listed = _listed(marker.parent)
-    replaced = {file for _, file in own}
+    replaced = {file for _, file in pairs}
     others = [pair for pair in listed if pair[1] not in replaced]
-    _write(marker, [*others, *own])
+    _write(marker, [*others, *pairs])
     for temporary, file in listed:
         if file in replaced:
             _remove(temporary)
     return others
 
 
-def _move(others: Sequence[Pair], own: Sequence[Pair]) -> dict[Path, OSError]:
+def _move(others: Sequence[Pair], pairs: Sequence[Pair]) -> dict[Path, OSError]:
     """Rename files, except those that have been; return those that cannot be, with the reason."""
     for temporary, file in others:
         # Somebody may have put another file there since.
@@ -199,7 +199,7 @@ def _move(others: Sequence[Pair], own: Sequence[Pair]) -> dict[Path, OSError]:
             if file.stat().st_mtime_ns > temporary.stat().st_mtime_ns:
                 temporary.unlink()
     failed = {}
-    for temporary, file in (*others, *own):
+    for temporary, file in (*others, *pairs):
         try:
             if temporary.exists():
                 temporary.replace(file)
@@ -236,10 +236,10 @@ def _write(marker: Path, pairs: Sequence[Pair], *, exclusive: bool = False) -> N
 def _read(marker: Path) -> dict[str, object]:
     """Read the marker; one that is missing or incomplete is empty."""
     try:
-        found = json.loads(marker.read_bytes())
+        content = json.loads(marker.read_bytes())
     except (OSError, ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return content if isinstance(content, dict) else {}
 
 
 def _is_a_name(text: str) -> bool:

@@ -111,12 +111,12 @@ def sweep(folder: Path, keep: Container[str] = ()) -> None:
     """
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            found = NAME.fullmatch(entry.name)
-            if found is None or entry.name in keep or entry.name in _ours:
+            match = NAME.fullmatch(entry.name)
+            if match is None or entry.name in keep or entry.name in _ours:
                 continue
             with suppress(OSError):
-                process = int(found[2])
-                runs = process != os.getpid() and may_run(found[1], process) is not False
+                process = int(match[2])
+                runs = process != os.getpid() and may_run(match[1], process) is not False
                 age = time.time() - entry.stat(follow_symlinks=False).st_mtime
                 if not runs or age > OLD:
                     os.unlink(entry.path)

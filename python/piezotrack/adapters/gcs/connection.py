@@ -166,28 +166,28 @@ class Connection:
         except _NoAnswerError as error:
             raise self._failed([*commands, "ERR?"], str(error)) from None
 
-    def answer(self, *asked: str, samples: int = 0) -> list[str]:
+    def answer(self, *commands: str, samples: int = 0) -> list[str]:
         """Return the lines of the next answer, without the spaces that join them."""
         lines: list[str] = []
         room, most = BYTES + samples * SAMPLE_BYTES, LINES + samples
         while not lines or not is_last(lines[-1]):
             if len(lines) == most:
-                raise self._failed(asked, f"has an answer of more than {most} lines")
-            line = self._next_line(asked, len(lines), room)
+                raise self._failed(commands, f"has an answer of more than {most} lines")
+            line = self._next_line(commands, len(lines), room)
             room -= len(line) + 1
             lines.append(line)
         self._due -= 1
         lines = [line.rstrip(" ") for line in lines]
         if self._got and not self._due:
             told, more = shown("\n".join(lines[:3])), shown(self._rest())
-            raise self._failed(asked, f"has the answer {told} and then {more}: expected no more")
+            raise self._failed(commands, f"has the answer {told} and then {more}: expected no more")
         self._limit = self._timeout
         return lines
 
-    def unexpected(self, asked: str, lines: Sequence[str], expected: str) -> DeviceError:
+    def unexpected(self, command: str, lines: Sequence[str], expected: str) -> DeviceError:
         """Return the error of an answer that is of another kind: that to another query, perhaps."""
         told = shown("\n".join(lines[:3]))
-        return self._failed([asked], f"has the answer {told}: expected {expected}")
+        return self._failed([command], f"has the answer {told}: expected {expected}")
 
     def close(self) -> None:
         """Close it for good."""
@@ -224,10 +224,10 @@ class Connection:
             raise self._failed((), f"sent {shown(unasked)} unasked: expected answers only")
         return False
 
-    def _next_line(self, asked: Sequence[str], before: int, room: int) -> str:
+    def _next_line(self, commands: Sequence[str], before: int, room: int) -> str:
         link = self._socket
         if link is None:
-            raise self._failed(asked, "has no answer: the connection was lost")
+            raise self._failed(commands, "has no answer: the connection was lost")
         # For a long answer silence is the end too, well before its last moment.
         searched, silent = 0, time.monotonic() + self._limit
         while (end := self._got.find(b"\n", searched)) < 0:
@@ -239,28 +239,28 @@ class Connection:
                 link.settimeout(max(left, 1e-3))
                 more = link.recv(CHUNK)
             except TimeoutError:
-                self._check_whole(asked, before)
+                self._check_whole(commands, before)
                 raise _NoAnswerError(f"was not answered in {self._limit:g} s") from None
             except OSError as error:
-                raise self._failed(asked, f"has no answer: {_reason(error)}") from None
+                raise self._failed(commands, f"has no answer: {_reason(error)}") from None
             if not more:
                 half = f"{self._half(before)}, " if self._got or before else ""
-                raise self._failed(asked, f"has no answer: {half}{HUNG_UP}")
+                raise self._failed(commands, f"has no answer: {half}{HUNG_UP}")
             self._got += more
             silent = time.monotonic() + self._limit
             if left < 0.0 and b"\n" not in more:
-                self._check_whole(asked, before)
+                self._check_whole(commands, before)
         if not 0 <= end <= room:
-            raise self._failed(asked, "has an answer that is too long")
+            raise self._failed(commands, "has an answer that is too long")
         line = bytes(self._got[:end])
         del self._got[: end + 1]
         return line.decode(ENCODING, errors="replace").rstrip("\r")
 
-    def _check_whole(self, asked: Sequence[str], before: int) -> None:
+    def _check_whole(self, commands: Sequence[str], before: int) -> None:
         """Fail where a part of an answer has come in the time for the whole."""
         if self._got or before:
             half = f"is answered by half, {self._half(before)}, and by no more in time"
-            raise self._failed(asked, half) from None
+            raise self._failed(commands, half) from None
 
     def _rest(self) -> str:
         return self._got.decode(ENCODING, errors="replace")
@@ -269,20 +269,20 @@ class Connection:
         lines = f"{before} lines and " if before else ""
         return f"{lines}{shown(self._rest())}"
 
-    def _no_error(self, asked: Sequence[str]) -> None:
+    def _no_error(self, commands: Sequence[str]) -> None:
         lines = self.answer("ERR?")
         if (code := _code(lines)) is None:
             raise self.unexpected("ERR?", lines, "a code")
         if code:
-            raise self._refused("; ".join(asked), code)
+            raise self._refused("; ".join(commands), code)
 
     def _refused(self, asked: str, code: int) -> DeviceError:
         return DeviceError(f"{self.name}: {_shown(asked)} is refused: {words_of(code)}")
 
-    def _failed(self, asked: Sequence[str], how: str) -> DeviceError:
+    def _failed(self, commands: Sequence[str], how: str) -> DeviceError:
         """Give the connection up, and return the error that says why."""
         self._drop()
-        what = f"{_shown(*asked)} " if asked else ""
+        what = f"{_shown(*commands)} " if commands else ""
         return DeviceError(f"{self.name}: {what}{how}")
 
 

@@ -151,16 +151,16 @@ class Lines:
                 yield more[at : at + 1]
                 at += 1
                 continue
-            found = self._end.search(more, at)
-            stop = found.start() if found else len(more)
+            match = self._end.search(more, at)
+            stop = match.start() if match else len(more)
             self._size += stop - at
             if self._size > self._longest:
                 self._begun.clear()
             else:
                 self._begun += more[at:stop]
-            if not found:
+            if not match:
                 return
-            at = found.end()
+            at = match.end()
             line = bytes(self._begun) if self._size <= self._longest else None
             self._begun.clear()
             self._size = 0

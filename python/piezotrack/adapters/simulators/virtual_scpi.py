@@ -103,18 +103,18 @@ class VirtualScpi:
     def answer(self, line: str) -> str | None:
         """Do the messages of a line and return their answers, or None where there are none."""
         messages = [one.strip().lstrip(":") for one in line.split(";") if one.strip()]
-        said: list[str] = []
+        answers: list[str] = []
         with self._lock:
             if len(messages) > MESSAGES:
                 self._error = TOO_MUCH
                 return None
             for message in messages:
                 if (answer := self._do(message)) is not None:
-                    said.append(answer)
-                if sum(map(len, said)) > ANSWER:
+                    answers.append(answer)
+                if sum(map(len, answers)) > ANSWER:
                     self._error = DEADLOCKED
                     return None
-        return ";".join(said) if said else None
+        return ";".join(answers) if answers else None
 
     def _converse(self, link: socket.socket) -> None:
         lines = Lines(b"\n", LINE)

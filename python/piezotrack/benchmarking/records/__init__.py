@@ -42,22 +42,22 @@ def records_named(records: Iterable[str | BenchmarkRecord] | None) -> list[Bench
     wanted = list(RECORDS) if records is None else records
     if isinstance(wanted, (str, BenchmarkRecord)):
         wanted = [wanted]
-    found: dict[str, BenchmarkRecord] = {}
-    for one in wanted:
-        if isinstance(one, BenchmarkRecord):
-            record = one
-        elif one in RECORDS:
-            record = RECORDS[one]()
+    chosen: dict[str, BenchmarkRecord] = {}
+    for name in wanted:
+        if isinstance(name, BenchmarkRecord):
+            record = name
+        elif name in RECORDS:
+            record = RECORDS[name]()
         else:
             raise ParameterError(
                 "records",
-                quoted(one),
+                quoted(name),
                 f"some of {', '.join(map(repr, RECORDS))}, or a pt.BenchmarkRecord",
                 verb="has",
             )
-        if record.name in found:
+        if record.name in chosen:
             raise ParameterError("records", f"{record.name} twice", "each name once", verb="has")
-        found[record.name] = record
-    if not found:
+        chosen[record.name] = record
+    if not chosen:
         raise ParameterError("records", "empty", "one or more")
-    return list(found.values())
+    return list(chosen.values())

@@ -107,15 +107,15 @@ def _plain_ticks(ax: Axes) -> None:
 
 def _styles(rows: list[BenchmarkResult]) -> list[dict[str, Any]]:
     """Give each part its mark: what was fitted, the rest of the record, and other records."""
-    others, found = cycle(OTHERS), []
+    others, styles = cycle(OTHERS), []
     for part in rows[0].parts:
         if part.part == "fitted":
-            found.append(FITTED)
+            styles.append(FITTED)
         elif part.part == "rest":
-            found.append(CARRIED)
+            styles.append(CARRIED)
         else:
-            found.append(next(others))
-    return found
+            styles.append(next(others))
+    return styles
 
 
 def _name(row: BenchmarkResult) -> str:

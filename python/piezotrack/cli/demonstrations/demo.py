@@ -54,18 +54,18 @@ def _measured(result: Output, seed: int) -> None:
     # The logs are known, and so is the model that suits them.
     model = identification_files("asymmetric-prandtl-ishlinskii", searched=False)
     result.will_write(["log.csv", "other.csv", *model, *picture_files(*PICTURES)])
-    found = run_demo(seed, progress=result.progress)
-    fit, other = found.fit, found.other
+    demo = run_demo(seed, progress=result.progress)
+    fit, other = demo.fit, demo.other
     run = fit.simulate(other)
     title = what_was_shown(fit, other, run)
     figures = (
         plot_loop(other, run, title=title).figure,
         plot_time(other, run, stroke=fit.stroke, title=title)[0].figure,
-        plot_before_and_after(found.runs),
+        plot_before_and_after(demo.runs),
     )
     with result_set(make_folder(result.out)) as folder:
         written = [
-            write_log(found.log, folder / "log.csv"),
+            write_log(demo.log, folder / "log.csv"),
             write_log(other.full, folder / "other.csv"),
         ]
         written += save_identification(fit, folder)
@@ -77,19 +77,19 @@ def _measured(result: Output, seed: int) -> None:
         # The head of the summary: the values of the parameters are in the model file.
         fit.summary().partition("\n\n")[0],
         "",
-        f"on the other log, not fitted: {found.score}",
+        f"on the other log, not fitted: {demo.score}",
         "",
         "Tracking of a 1 Hz triangle from 5 to 42 um with this model, simulated on a stage",
         "identified from the other log:",
-        *_runs({name: name for name in found.runs}, found.runs),
+        *_runs({name: name for name in demo.runs}, demo.runs),
         "",
         "The same by hand, and more:",
         *(f"  piezotrack {line}" for line in _commands(result.out, fit.model.info.name)),
     ]
     document = {
         "model": {**fit.document(), "notes": fit.notes},
-        "validation": asdict(found.score),
-        "tracking": {name: asdict(one.metrics) for name, one in found.runs.items()},
+        "validation": asdict(demo.score),
+        "tracking": {name: asdict(one.metrics) for name, one in demo.runs.items()},
         "unit": UNIT,
     }
     result.show("\n".join(words), document, written)

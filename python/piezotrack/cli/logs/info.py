@@ -41,7 +41,7 @@ def info_command(
     from ..output import print_words
 
     columns = Columns(time, drive, displacement, unit, dt)
-    found = info(
+    report = info(
         file,
         time=columns.time,
         drive=columns.drive,
@@ -51,6 +51,6 @@ def info_command(
         missing=missing,
     )
     if json:
-        print(json_text.dumps(json_ready(found.document()), indent=2, allow_nan=False))
+        print(json_text.dumps(json_ready(report.document()), indent=2, allow_nan=False))
     else:
-        print_words(found.summary())
+        print_words(report.summary())

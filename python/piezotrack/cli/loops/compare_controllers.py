@@ -79,14 +79,14 @@ def compare_controllers_command(
     from ...control.tuning.margins import Margins
     from ...identification.fitted.model_file import load
 
-    own = stage != PAPER
-    refuse_of_other_stage(context, own)
-    known = load(model) if own else driven_by_voltage(load(model), model)
-    settings = Loop(own, dt, limits, None, None, None, None)
+    of_model = stage != PAPER
+    refuse_of_other_stage(context, of_model)
+    known = load(model) if of_model else driven_by_voltage(load(model), model)
+    settings = Loop(of_model, dt, limits, None, None, None, None)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["controllers.json", *picture_files("controllers")])
     plant = simulated(stage, known, noise_metres(noise_nm), bandwidth, seed)
-    found = compare_controllers(
+    comparison = compare_controllers(
         plant,
         known,
         dt=settings.dt(known, None),
@@ -100,7 +100,7 @@ def compare_controllers_command(
         seeds=seeds,
         search=TuningSearch(seed=seed),
     )
-    result.show(str(found), found.document(), found.save(out))
+    result.show(str(comparison), comparison.document(), comparison.save(out))
 
 
 def _rates(text: str) -> tuple[float, float, float]:

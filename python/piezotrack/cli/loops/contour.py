@@ -138,16 +138,16 @@ def contour_command(
     from ...control.timing import Timing
     from ...xu_li_2010.experiments.table_2 import run_table_2
 
-    own = _is_own(stage, models, table_2)
+    of_model = _is_own(stage, models, table_2)
     gains = _gains(kp)
-    loop = Loop(own, dt, limits, feedback, gains[0], ti, td)
+    loop = Loop(of_model, dt, limits, feedback, gains[0], ti, td)
     loop.check(context)
-    refuse_of_other_stage(context, own)
-    if own and not (noise_nm or jitter):
+    refuse_of_other_stage(context, of_model)
+    if of_model and not (noise_nm or jitter):
         refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
-    _check(context, models, path, table_2, feedforward, own)
+    _check(context, models, path, table_2, feedforward, of_model)
     both = loop, replace(loop, kp=gains[1])
-    xy = OwnStage(models, both) if own else PaperStage(models, loop, seed)
+    xy = OwnStage(models, both) if of_model else PaperStage(models, loop, seed)
     plant = _changed(xy.stage(noise_metres(noise_nm), bandwidth, seed), lag, cross_talk)
     desired = None if path is None else _path(path, duration, period, path_dt, xy.place(plant))
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
@@ -171,9 +171,9 @@ def contour_command(
     shares = [f"{100 * share:g} %" for share in plant.cross_talk]
     between = f"y lags by {plant.lag:g} s, {shares[0]} of y in x, {shares[1]} of x in y"
     lines = [f"stage: {xy.name}: {between}; {how}", words]
-    if own and not loop.has_feedback:
+    if of_model and not loop.has_feedback:
         lines.append(NO_FEEDBACK)
-    result.show("\n".join(lines), document | {"stage": MODEL if own else PAPER}, written)
+    result.show("\n".join(lines), document | {"stage": MODEL if of_model else PAPER}, written)
 
 
 def _gains(kp: str | None) -> tuple[float | None, float | None]:
@@ -201,7 +201,7 @@ def _check(
     path: str | None,
     table_2: bool,
     feedforward: bool,
-    own: bool,
+    of_model: bool,
 ) -> None:
     """Refuse options that exclude each other."""
     if table_2 == (path is not None):
@@ -214,7 +214,7 @@ def _check(
         raise ParameterError(f"{len(models)} model files are given: expected two at most, x and y")
     if not feedforward:
         refuse_without_effect(context, ["decouple"], "with --no-feedforward")
-        if models and not own:
+        if models and not of_model:
             raise ParameterError(
                 "MODEL_X", models[0], "none with --no-feedforward, where it has no effect"
             )

@@ -135,11 +135,11 @@ def learn_command(
     from ...control.timing import Timing
     from ...references.parse import reference_of
 
-    own = stage != PAPER
-    settings = Loop(own, dt, limits, feedback, kp, ti, td)
+    of_model = stage != PAPER
+    settings = Loop(of_model, dt, limits, feedback, kp, ti, td)
     _check_options(context, settings, device, noise_nm)
     _check_file(out)
-    known = known_model(model, zero=zero, paper=not own)
+    known = known_model(model, zero=zero, paper=not of_model)
     desired = reference_of(reference, duration=duration, period=period)
     result = Output(out.parent, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write([out.name, *(picture_files(out.stem) if picture else [])])
@@ -155,9 +155,9 @@ def learn_command(
                 limits=_within(plant, settings, known),
                 feedforward=known.inverse() if feedforward else None,
                 feedback=settings.pid(known),
-                drive_unit=unit_of(own, known),
+                drive_unit=unit_of(of_model, known),
             )
-            found = learn(
+            learning = learn(
                 plant,
                 desired,
                 loop,
@@ -176,8 +176,8 @@ def learn_command(
         raise with_what_is_kept(
             error, "learnt", lambda learnt: _kept(learnt, out, picture)
         ) from None
-    words = _outcome(found) if device is None else f"{_outcome(found)}\n{found.final.note}"
-    result.show(words, found.document(), _write(found, out, picture))
+    words = _outcome(learning) if device is None else f"{_outcome(learning)}\n{learning.final.note}"
+    result.show(words, learning.document(), _write(learning, out, picture))
 
 
 def _check_options(
@@ -216,14 +216,14 @@ def _within(
     return low, high
 
 
-def _write(found: Learning, out: Path, picture: bool) -> list[Path]:
+def _write(learning: Learning, out: Path, picture: bool) -> list[Path]:
     """Write the table and, where it is asked for, the picture."""
     from ..._support.files.writing import make_folder, result_set, save_figures
 
     with result_set(make_folder(out.parent)) as folder:
-        written = [found.save(folder / out.name)]
+        written = [learning.save(folder / out.name)]
         if picture:
-            written += save_figures({out.stem: found.plot()}, folder)
+            written += save_figures({out.stem: learning.plot()}, folder)
     return written
 
 
@@ -242,9 +242,9 @@ def _show(learner: IterativeLearning) -> None:
     print(line, flush=True)
 
 
-def _outcome(found: Learning) -> str:
+def _outcome(learning: Learning) -> str:
     from ...control.views.learning_text import outcome
 
-    before, after = found.errors[0], found.errors[found.best]
-    best = f"best: trial {found.best}, {1e9 * after:.4g} nm rms after {1e9 * before:.4g} nm"
-    return "\n".join([*outcome(found), best])
+    before, after = learning.errors[0], learning.errors[learning.best]
+    best = f"best: trial {learning.best}, {1e9 * after:.4g} nm rms after {1e9 * before:.4g} nm"
+    return "\n".join([*outcome(learning), best])

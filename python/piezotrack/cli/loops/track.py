@@ -165,19 +165,19 @@ def track_command(
         _on_device(model, device, desired, result, beyond_reach=beyond_reach, unstable=unstable)
         return
     check_stage(stage)
-    own = stage != PAPER
-    settings = Loop(own, dt, limits, feedback, kp, ti, td, tt)
+    of_model = stage != PAPER
+    settings = Loop(of_model, dt, limits, feedback, kp, ti, td, tt)
     settings.check(context)
-    refuse_of_other_stage(context, own)
+    refuse_of_other_stage(context, of_model)
     if not feedforward:
         refuse_without_effect(context, ["online"], "with --no-feedforward")
     if not (feedforward or repetitive or settings.has_feedback):
         raise ParameterError("--no-feedforward: expected --kp and --ti, or nothing moves the stage")
     if not repetitive:
         refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
-    if own and not (noise_nm or jitter):
+    if of_model and not (noise_nm or jitter):
         refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
-    known = known_model(model, zero=zero, paper=not own)
+    known = known_model(model, zero=zero, paper=not of_model)
     desired = reference_of(reference, duration=duration, period=period)
     playback: Literal["table", "online"] = "online" if online else "table"
     loop = Controller(
@@ -186,14 +186,14 @@ def track_command(
         feedforward=known.inverse(playback=playback) if feedforward else None,
         feedback=settings.pid(known),
         repetitive=settings.repetitive(known, desired, kq, tq) if repetitive else None,
-        drive_unit=unit_of(own, known),
+        drive_unit=unit_of(of_model, known),
     )
-    plant = simulated(None if own else PAPER, known, noise_metres(noise_nm), bandwidth, seed)
+    plant = simulated(None if of_model else PAPER, known, noise_metres(noise_nm), bandwidth, seed)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     free = {"beyond_reach": beyond_reach, "unstable": unstable}
     run = track(plant, loop, desired, timing=Timing(delay=delay, jitter=jitter), **free)
-    name = f"{model.name}{zero_words(known)}" if own else "the virtual stage of Xu and Li 2010"
+    name = f"{model.name}{zero_words(known)}" if of_model else "the virtual stage of Xu and Li 2010"
     lines = [f"stage: {name}", run.summary()]
     notes = drive_notes(known, run)
     lines += [f"note  {note}" for note in notes]
@@ -201,12 +201,12 @@ def track_command(
         margins = check_loop(plant, loop, delay=delay).middle
         lines.append(f"loop at {margins}")
         lines += [f"note  {note}" for note in small_margins(margins)]
-    elif own:
+    elif of_model:
         lines.append(NO_FEEDBACK)
     entries = {
         "model_drive_range": known.drive_range,
         "notes": notes,
-        "stage": MODEL if own else PAPER,
+        "stage": MODEL if of_model else PAPER,
     }
     result.show("\n".join(lines), run.document() | entries, run.save(out, entries=entries))
 

@@ -122,13 +122,13 @@ class PaperStage:
 
         inverse = self._inverse() if feedforward else None
         interval = path.x if path is not None else None
-        one = Controller(
+        controller = Controller(
             dt=self._loop.dt(None, interval),
             limits=self._loop.volts(None),
             feedforward=inverse,
             feedback=self._loop.pid(None),
         )
-        return one, one
+        return controller, controller
 
     def _inverse(self) -> Inverse:
         """Invert the model, or one identified as in the paper."""

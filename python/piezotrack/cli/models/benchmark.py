@@ -111,20 +111,20 @@ def benchmark_command(
     records: list[str | BenchmarkRecord] = list(record or [])
     records += [_record(file, read(file), train, test, None) for file in files or []]
     if listed is not None:
-        for file, said in _lines(listed):
+        for file, keys in _lines(listed):
             other = None
-            if "other" in said:
-                path = listed.parent / said["other"]
-                other = windowed(read(path), path, "other-test", said.get("other-test"))
-            records.append(_record(file, read(file), said.get("train"), said.get("test"), other))
-    found = benchmark(
+            if "other" in keys:
+                path = listed.parent / keys["other"]
+                other = windowed(read(path), path, "other-test", keys.get("other-test"))
+            records.append(_record(file, read(file), keys.get("train"), keys.get("test"), other))
+    board = benchmark(
         records or None, model or None, folder=out, overwrite=overwrite, progress=result.progress
     )
-    written = found.save(out)
-    if all(one.error for one in found.results):
-        first = found.results[0]
+    written = board.save(out)
+    if all(one.error for one in board.results):
+        first = board.results[0]
         raise DataError(f"no model was found of any record; {first.record}: {first.error}")
-    result.show(found.summary(), found.document(), written)
+    result.show(board.summary(), board.document(), written)
 
 
 def _record(
@@ -151,7 +151,7 @@ def _lines(listed: Path) -> list[tuple[Path, dict[str, str]]]:
         raise ParameterError(f"--list: {listed} cannot be read: {reason}") from None
     except UnicodeDecodeError:
         raise ParameterError(f"--list: {listed} is not a text file") from None
-    found = []
+    entries = []
     for number, line in enumerate(text.splitlines(), 1):
         where = f"{listed}:{number}"
         try:
@@ -160,15 +160,15 @@ def _lines(listed: Path) -> list[tuple[Path, dict[str, str]]]:
             raise DataError(f"{where}: {str(error).lower()}") from None
         if not words:
             continue
-        said = dict(word.partition("=")[::2] for word in words[1:])
-        if len(said) < len(words) - 1 or not said.keys() <= set(SAID) or not all(said.values()):
+        keys = dict(word.partition("=")[::2] for word in words[1:])
+        if len(keys) < len(words) - 1 or not keys.keys() <= set(SAID) or not all(keys.values()):
             raise DataError(
                 f"{where}: '{' '.join(words[1:])}': expected NAME=VALUE with the names "
                 f"{', '.join(SAID)}, each once at most"
             )
-        if "other-test" in said and "other" not in said:
+        if "other-test" in keys and "other" not in keys:
             raise DataError(f"{where}: other-test has no effect without other=")
-        found.append((listed.parent / words[0], said))
-    if not found:
+        entries.append((listed.parent / words[0], keys))
+    if not entries:
         raise DataError(f"{listed}: no log is listed: expected one a line")
-    return found
+    return entries

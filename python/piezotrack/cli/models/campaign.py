@@ -184,18 +184,20 @@ def campaign_command(
     }
     with _executor(workers, dask) as executor:
         try:
-            found = campaign(logs, models, numbers, executor, folder=out, progress=result.progress)
+            results = campaign(
+                logs, models, numbers, executor, folder=out, progress=result.progress
+            )
         except Interrupted:
             acknowledge_interrupt()
             raise
-    written = [out / "campaign.json", *dict.fromkeys(one.file for one in found)]
-    written += save_figures({"campaign": found.plot()}, out)
+    written = [out / "campaign.json", *dict.fromkeys(one.file for one in results)]
+    written += save_figures({"campaign": results.plot()}, out)
     if parquet:
-        written.append(found.to_parquet(out / PARQUET))
-    if len(found.failed) == len(found):
-        first = found.failed[0]
+        written.append(results.to_parquet(out / PARQUET))
+    if len(results.failed) == len(results):
+        first = results.failed[0]
         raise DataError(f"no model was found of any log; {first.record}: {first.error}")
-    result.show(found.summary(), found.document(), _few(written, json=json))
+    result.show(results.summary(), results.document(), _few(written, json=json))
 
 
 def _titles(files: list[Path]) -> dict[str, Path]:
@@ -212,12 +214,12 @@ def _seeds(text: str) -> range:
     """Parse N or A:B."""
     first, colon, last = text.rpartition(":")
     try:
-        found = range(int(first) if colon else 0, int(last))
+        seeds = range(int(first) if colon else 0, int(last))
     except ValueError:
-        found = range(0)
-    if not found or found.start < 0:
+        seeds = range(0)
+    if not seeds or seeds.start < 0:
         raise ParameterError("--seeds", f"'{text}'", "a number, as 10, or A:B, as 10:20")
-    return found
+    return seeds
 
 
 def _few(written: list[Path], *, json: bool) -> list[Path]:

@@ -104,7 +104,7 @@ def compare_command(
         names = comparison_files(model or None, log.drive_unit)
     result.will_write(name for name in names if (out / name).resolve() not in given)
     with of_file(file):
-        found = compare(
+        comparison = compare(
             log,
             model or None,
             train=fitted,
@@ -114,4 +114,8 @@ def compare_command(
             threads=threads,
             progress=result.progress,
         )
-    result.show(found.summary(), {**found.document(), "notes": found.notes}, found.save(out))
+    result.show(
+        comparison.summary(),
+        {**comparison.document(), "notes": comparison.notes},
+        comparison.save(out),
+    )

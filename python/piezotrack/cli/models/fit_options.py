@@ -364,14 +364,14 @@ class FitOptions:
             for name, text in pairs(option, texts):
                 given.setdefault(name, {})[what] = PARSERS[what](option, text)
         if self.stiffness is not None:
-            said = given.setdefault("stiffness", {})
-            if "value" in said and said["value"] != self.stiffness:
+            stiffness = given.setdefault("stiffness", {})
+            if "value" in stiffness and stiffness["value"] != self.stiffness:
                 raise ParameterError(
                     "--stiffness",
                     f"{self.stiffness:g}",
                     "the value given for it by --fix, or only one of the two",
                 )
-            said["value"] = self.stiffness
+            stiffness["value"] = self.stiffness
         for name in self._free:
             if "value" in given.setdefault(name, {}):
                 raise ParameterError("--free", name, "a parameter that is not fixed as well")
@@ -390,16 +390,16 @@ class FitOptions:
         for name in self._free:
             if name not in names:
                 raise ParameterError("--free", f"'{name}'", f"one of {', '.join(names)}")
-        for one in infos:
-            said = parameters.get(one.name)
+        for info in infos:
+            said = parameters.get(info.name)
             has_value = said is not None and (said.value is not None or said.tie is not None)
             # The stiffness may be nominal.
-            nominal = one.name == "stiffness" and one.carries_force
-            if not (one.name in self._free or has_value or nominal or one.default is not None):
+            nominal = info.name == "stiffness" and info.carries_force
+            if not (info.name in self._free or has_value or nominal or info.default is not None):
                 raise ParameterError(
                     "--free",
                     ", ".join(self._free),
-                    f"{one.name} as well, or a value for it by --fix",
+                    f"{info.name} as well, or a value for it by --fix",
                 )
 
     def _methods(self, kind: str) -> list[OneMethod] | None:

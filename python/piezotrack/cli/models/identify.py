@@ -206,10 +206,10 @@ def identify_command(
         (out / _partial(kind)).unlink(missing_ok=True)
         words.append(fit.summary())
         if second is not None and score is not None:
-            own = ", with an offset of its own" if offset and score.fitted_share < 1.0 else ""
+            refitted = ", with an offset of its own" if offset and score.fitted_share < 1.0 else ""
             span = f"from {second.t[0]:.6g} to {second.t[-1]:.6g} s"
             fitted = share_fitted(score.fitted_share)
-            words.append(f"on {second.source} {span}, {fitted}{own}: {score}")
+            words.append(f"on {second.source} {span}, {fitted}{refitted}: {score}")
             words += [f"note  {note}" for note in score.notes]
         documents.append({**fit.document(), "notes": fit.notes})
     result.show("\n\n".join(words), {"models": documents}, written)

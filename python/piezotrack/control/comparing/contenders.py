@@ -182,11 +182,11 @@ def _observed(task: Task) -> list[Entry | None]:
 
 def _keeps(controller: Controller, plant: _core.LoopPlant, margins: Margins) -> bool:
     """Check the margins that every controller keeps."""
-    found = _core.check_loop(controller._core, plant)
+    loop = _core.check_loop(controller._core, plant)
     return bool(
-        found["stable"]
-        and found["sensitivity"] <= margins.sensitivity
-        and (found["gain_margin"] or math.inf) >= margins.gain
+        loop["stable"]
+        and loop["sensitivity"] <= margins.sensitivity
+        and (loop["gain_margin"] or math.inf) >= margins.gain
     )
 
 
@@ -199,7 +199,7 @@ def _scheduled(task: Task) -> list[Entry | None]:
     half = 0.5 * (sines[0].high - sines[0].low)
     made = {(half, 1.0 / one.period): one for one in sines if one.period is not None}
     rates = sorted(rate for _, rate in made)
-    found = schedule(
+    scheduled = schedule(
         task.stage,
         [half],
         rates,
@@ -213,7 +213,7 @@ def _scheduled(task: Task) -> list[Entry | None]:
         timing=task.timing,
         **{"goal": TRUE_ERROR, **task.options},
     )
-    return task.each(found.controller)
+    return task.each(scheduled.controller)
 
 
 def _repetitive(task: Task) -> list[Entry | None]:
@@ -233,12 +233,12 @@ def _learnt(task: Task) -> list[Entry | None]:
             entries.append(None)
             continue
         try:
-            found = learn(task.stage, reference, controller, timing=task.timing, trials=12)
+            learning = learn(task.stage, reference, controller, timing=task.timing, trials=12)
         except ParameterError:
             # No table of this period converges on the set of models.
             entries.append(None)
             continue
-        entries.append(Entry(controller, found.final.reference, found.final.feedforward))
+        entries.append(Entry(controller, learning.final.reference, learning.final.feedforward))
     return entries
 
 

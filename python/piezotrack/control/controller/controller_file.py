@@ -59,32 +59,33 @@ def inverse_of(entry: Any, drive: str) -> Inverse | None:
     """Read a feedforward from its entry."""
     if entry is None:
         return None
-    found = object_of("feedforward", entry)
+    feedforward = object_of("feedforward", entry)
     keys = ["kind", "stage", "offset_m", "delay_s", "playback", "settle_periods", "initial"]
-    network = found.get("kind") == "network"
-    if not network and found.get("kind") != "inverse":
-        kind = quoted(found.get("kind"))
+    network = feedforward.get("kind") == "network"
+    if not network and feedforward.get("kind") != "inverse":
+        kind = quoted(feedforward.get("kind"))
         raise ParameterError("feedforward: kind", kind, "'inverse' or 'network'")
     errors = [f"trained_{drive}", f"held_out_{drive}"]
-    only("feedforward", found, [*keys, "numbers", *errors] if network else keys)
-    stage = stage_of("feedforward: stage", found["stage"], drive)
-    initial = found["initial"]
+    only("feedforward", feedforward, [*keys, "numbers", *errors] if network else keys)
+    stage = stage_of("feedforward: stage", feedforward["stage"], drive)
+    initial = feedforward["initial"]
     given: dict[str, Any] = {
         "stage": stage,
-        "offset": _core.as_number("feedforward: offset_m", found["offset_m"]),
-        "delay": _core.as_number("feedforward: delay_s", found["delay_s"]),
-        "playback": found["playback"],
-        "settle": _core.as_count("feedforward: settle_periods", found["settle_periods"]),
+        "offset": _core.as_number("feedforward: offset_m", feedforward["offset_m"]),
+        "delay": _core.as_number("feedforward: delay_s", feedforward["delay_s"]),
+        "playback": feedforward["playback"],
+        "settle": _core.as_count("feedforward: settle_periods", feedforward["settle_periods"]),
         "initial": None
         if initial is None
         else state_of("feedforward: initial", initial, stage_class(stage.info)._state),
     }
     if not network:
         return Inverse(**given)
-    numbers = object_of("feedforward: numbers", found["numbers"])
+    numbers = object_of("feedforward: numbers", feedforward["numbers"])
     only("feedforward: numbers", numbers, NETWORK)
     trained, held_out = (
-        math.nan if found[key] is None else _core.as_number(key, found[key]) for key in errors
+        math.nan if feedforward[key] is None else _core.as_number(key, feedforward[key])
+        for key in errors
     )
     values = [numbers[key] for key in NETWORK]
     values[1] = tuple(values[1])

@@ -69,17 +69,17 @@ def _controller_of(document: dict[str, Any]) -> Controller:
     drive = document.get("drive_unit")
     if drive not in DRIVE_UNITS:
         raise ParameterError("drive_unit", quoted(drive), "'V', 'm' or 'N'")
-    own = ("dt_s", f"limits_{drive}", "span_m", "max_jump_m")
+    numbers = ("dt_s", f"limits_{drive}", "span_m", "max_jump_m")
     parts = ("feedforward", "feedback", "repetitive", "filters")
-    keys = ("format", "schema_version", "drive_unit", *own, *parts, "provenance")
+    keys = ("format", "schema_version", "drive_unit", *numbers, *parts, "provenance")
     only("", document, keys)
-    dt, limits, span, jump = (document[key] for key in own)
+    dt, limits, span, jump = (document[key] for key in numbers)
     filters = document["filters"]
     if not isinstance(filters, list):
         raise ParameterError("filters", quoted(filters), "a list of filters")
     return Controller(
         dt=_core.as_number("dt_s", dt),
-        limits=_pair(own[1], limits),
+        limits=_pair(numbers[1], limits),
         span=None if span is None else _pair("span_m", span),
         max_jump=math.inf if jump == "inf" else jump,
         drive_unit=drive,
@@ -100,15 +100,15 @@ def _pair(name: str, value: Any) -> tuple[float, float]:
 
 
 def _provenance_of(document: dict[str, Any]) -> dict[str, Any]:
-    found = object_of("provenance", document["provenance"])
-    only("provenance", found, ("package", "version", "model_sha256", "design"))
+    provenance = object_of("provenance", document["provenance"])
+    only("provenance", provenance, ("package", "version", "model_sha256", "design"))
     forward = document["feedforward"]
     expected = None if forward is None else digest(forward["stage"])
-    if found["model_sha256"] not in (None, expected):
+    if provenance["model_sha256"] not in (None, expected):
         raise ParameterError(
             "provenance: model_sha256",
-            quoted(found["model_sha256"]),
+            quoted(provenance["model_sha256"]),
             f"{expected!r}, that of the stage in the file, or null where the stage was changed "
             "on purpose",
         )
-    return found
+    return provenance

@@ -121,7 +121,7 @@ def learning_plants(
     later = [not_negative("more_delays", one, "s") for one in _some("more_delays", more_delays)]
     scales = [positive("mode_scales", one, "1") for one in _some("mode_scales", mode_scales)]
     without = replace(controller, repetitive=None)
-    found, nominal = [], None
+    plants, nominal = [], None
     for i, model in enumerate(models):
         stage = plant_of(model)
         title = stage.stage.info.title + (f" (models[{i - 1}])" if i else "")
@@ -133,10 +133,10 @@ def learning_plants(
                     name = f"{title}, {gain} gain"
                     name += "" if scale == 1.0 else f", modes at {scale:g} times"
                     name += "" if more == 0.0 else f", {1e3 * more:.3g} ms more delay"
-                    found.append(LearningPlant(name, _varied(plant, scale, more), without))
+                    plants.append(LearningPlant(name, _varied(plant, scale, more), without))
     if nominal is None:
         raise ParameterError("models", "empty", "a stage or an identified model")
-    return nominal, found
+    return nominal, plants
 
 
 def _some(name: str, given: float | Sequence[float]) -> tuple[float, ...]:

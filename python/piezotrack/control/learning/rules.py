@@ -234,10 +234,10 @@ def frequency_rule(
             convergence=Convergence._worst(cases),
         )
 
-    if cutoff is not None and (asked := made(cutoff)).convergence.monotone:
-        return asked
+    if cutoff is not None and (wanted := made(cutoff)).convergence.monotone:
+        return wanted
     edge = _highest(made, 0.5 * frequency[1], HIGHEST_CHOSEN / dt, 1.01)
-    return _converging(made(edge), None if cutoff is None else asked)
+    return _converging(made(edge), None if cutoff is None else wanted)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -348,10 +348,10 @@ def lifted_rule(
             convergence=Convergence._worst(cases),
         )
 
-    if cutoff is not None and (asked := made(cutoff)).convergence.monotone:
-        return asked
+    if cutoff is not None and (wanted := made(cutoff)).convergence.monotone:
+        return wanted
     edge = _highest(made, LOWEST_EDGE / dt, HIGHEST_CHOSEN / dt, 1.1)
-    return _converging(made(edge), None if cutoff is None else asked)
+    return _converging(made(edge), None if cutoff is None else wanted)
 
 
 def _smoothed(columns: NDArray[np.floating[Any]], edge: float) -> Array:
@@ -420,26 +420,27 @@ def _highest(made: Callable[[float], Rule], low: float, high: float, closely: fl
     return low
 
 
-def _converging(best: R, asked: R | None) -> R:
+def _converging(best: R, wanted: R | None) -> R:
     """Return the best update, or refuse that which was asked for, or both.
 
     Parameters
     ----------
     best : FrequencyRule or LiftedRule
         That of the highest cutoff that converges, if any does.
-    asked : FrequencyRule or LiftedRule or None
+    wanted : FrequencyRule or LiftedRule or None
         That of a cutoff that was given, which does not.
     """
-    if asked is None and best.convergence.monotone:
+    if wanted is None and best.convergence.monotone:
         return best
-    rule = best if asked is None else asked
+    rule = best if wanted is None else wanted
     remedy = "a smaller learning gain, or models less far apart"
     if best.convergence.monotone:
         remedy = f"a cutoff of {best.cutoff:.3g} Hz in place of {rule.cutoff:.3g}, or {remedy}"
-    found = rule.convergence
+    convergence = rule.convergence
     raise ParameterError(
-        f"learning does not converge on {found.model}: at {found.frequency:.4g} Hz a trial leaves "
-        f"{found.factor:.4g} times the distance to the final table: expected below 1, with "
+        f"learning does not converge on {convergence.model}: at {convergence.frequency:.4g} Hz "
+        f"a trial leaves {convergence.factor:.4g} times the distance to the final table: "
+        "expected below 1, with "
         f"{remedy}",
         argument="cutoff",
     )

@@ -89,7 +89,7 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
     if report.stable:
         return
     middle = report.middle
-    found = f"the loop is unstable on this stage, {middle.gain_text}"
+    problem = f"the loop is unstable on this stage, {middle.gain_text}"
     law = controller.feedback
     without = middle.gain_margin is not None and middle.gain_margin < 1.0
     if without and middle.stable_gains is not None and middle.stable_gains[1] < 1.0:
@@ -98,18 +98,18 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
             unit, scale = shown_unit(controller.drive_unit)
             kp = 1e-6 * scale * law._pid.kp
             gains = f"{share * kp:.3g} {unit}/um in place of {kp:.3g}"
-            found += f"; at the limit kp would be {gains}"
-            found += ", and half of that has a gain margin of 2" if low < 0.5 * share else ""
+            problem += f"; at the limit kp would be {gains}"
+            problem += ", and half of that has a gain margin of 2" if low < 0.5 * share else ""
         else:
-            found += f"; at the limit the gain would be {share:.3g} times as large"
+            problem += f"; at the limit the gain would be {share:.3g} times as large"
     elif without:
-        found += (
+        problem += (
             f"; at the limit the feedback's gain would be {middle.gain_margin:.3g} times as large"
         )
     elif controller.repetitive is not None:
-        found += "; without the repetitive part it is stable, so lower kq or take another filter"
+        problem += "; without the repetitive part it is stable, so lower kq or take another filter"
     hint = f" ({middle.hint})" if middle.hint else ""
-    words = f"{found}{hint}: expected a stable one, or unstable=True"
+    words = f"{problem}{hint}: expected a stable one, or unstable=True"
     raise ParameterError(words, argument="controller")
 
 

@@ -301,22 +301,22 @@ def check_loop(
 
 
 def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
-    found = _core.check_loop(controller._core, plant)
-    slowest, margin = found["slowest"], found["gain_margin"]
+    loop = _core.check_loop(controller._core, plant)
+    slowest, margin = loop["slowest"], loop["gain_margin"]
     return LoopCheck(
         gain=plant.static_gain,
-        stable=found["stable"],
-        exact=found["exact"],
+        stable=loop["stable"],
+        exact=loop["exact"],
         gain_margin=None if margin is None or math.isinf(margin) else margin,
-        stable_gains=found["gains"],
-        phase_margin=found["phase_margin"],
-        delay_margin=found["delay_margin"],
-        crossover=found["crossover"],
-        sensitivity=found["sensitivity"],
+        stable_gains=loop["gains"],
+        phase_margin=loop["phase_margin"],
+        delay_margin=loop["delay_margin"],
+        crossover=loop["crossover"],
+        sensitivity=loop["sensitivity"],
         slowest_root=None if slowest is None else slowest[0],
-        periods=found["periods"],
-        small_gain=found["small_gain"],
-        hidden_roots=found["hidden"],
-        hint=found["hint"],
+        periods=loop["periods"],
+        small_gain=loop["small_gain"],
+        hidden_roots=loop["hidden"],
+        hint=loop["hint"],
         drive_unit=controller.drive_unit,
     )

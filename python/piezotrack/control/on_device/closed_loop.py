@@ -107,7 +107,7 @@ class _Log:
 
 
 def track_on(
-    asked: Device,
+    driver: Device,
     controller: Controller,
     reference: Reference,
     *,
@@ -119,7 +119,7 @@ def track_on(
 
     Parameters
     ----------
-    asked : Device
+    driver : Device
         One with `exchange`.
     controller, reference, beyond_reach, unstable
         As of `pt.track`; reach and stability are checked on the model of the feedforward, with the
@@ -142,7 +142,7 @@ def track_on(
     Interrupted
         Ctrl-C or SIGTERM came; the output is at `safe`. Its `partial` is the run up to then.
     """
-    device = check_exchanging(asked)
+    device = check_exchanging(driver)
     check_limits(device, controller)
     if controller.drive_unit != "V":
         raise ParameterError(
@@ -160,16 +160,16 @@ def track_on(
         latency = measure_latency(device, controller.dt, rest=home)
         refuse_slow(latency, controller.dt)
         _check_model(planned, latency, beyond_reach=beyond_reach, unstable=unstable)
-        told = f"{note}; the loop closed on {device.channels[0]}"
+        notes = f"{note}; the loop closed on {device.channels[0]}"
         try:
             _run(device, volts, home, log)
         except DeviceError as error:
-            error.partial = log.tracking(latency, told)
+            error.partial = log.tracking(latency, notes)
             raise
         except KeyboardInterrupt as error:
-            part = log.tracking(latency, told)
+            part = log.tracking(latency, notes)
             raise Interrupted(str(error) or "the loop was interrupted", part) from None
-    run = log.tracking(latency, told)
+    run = log.tracking(latency, notes)
     assert run is not None
     return run
 

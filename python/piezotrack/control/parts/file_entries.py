@@ -80,10 +80,10 @@ def stage_entry(stage: InvertibleStage, drive: str) -> dict[str, Any]:
 
 def stage_of(place: str, entry: Any, drive: str) -> Stage:
     """Read a stage; arguments and errors as of `part_of`."""
-    found = object_of(place, entry)
-    only(place, found, ("model", "parameters"))
-    info = model_named(found["model"])
-    parameters = object_of(f"{place}: parameters", found["parameters"])
+    stage = object_of(place, entry)
+    only(place, stage, ("model", "parameters"))
+    info = model_named(stage["model"])
+    parameters = object_of(f"{place}: parameters", stage["parameters"])
     only(f"{place}: parameters", parameters, [one.name for one in info.parameters])
     for name, one in parameters.items():
         only(f"{place}: {name}", object_of(name, one), ("value", "unit", "symbol"))

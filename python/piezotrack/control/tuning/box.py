@@ -68,16 +68,16 @@ class Box(NamedTuple):
 
     def edges(self, settings: dict[str, float]) -> list[str]:
         """Name the settings that are at an end of their range."""
-        found = []
+        notes = []
         for name, low, high, logarithmic in self.ranges:
             ends = (math.log(low), math.log(high)) if logarithmic else (low, high)
             value = math.log(settings[name]) if logarithmic else settings[name]
             place = (value - ends[0]) / (ends[1] - ends[0])
             if place > 0.999:
-                found.append(f"{name} is at the upper end of its range, {high:.4g}")
+                notes.append(f"{name} is at the upper end of its range, {high:.4g}")
             elif place < 0.001 and name not in ("kd", "order", "lead", "notch_depth"):
-                found.append(f"{name} is at the lower end of its range, {low:.4g}")
-        return found
+                notes.append(f"{name} is at the lower end of its range, {low:.4g}")
+        return notes
 
 
 def _whole(value: float) -> int:
@@ -97,15 +97,15 @@ def parts_named(parts: object) -> tuple[str, ...] | None:
 
 def resonance(plants: Sequence[_core.LoopPlant], dt: float) -> tuple[float, float] | None:
     """Lowest and highest frequency [Hz] of the modes that ring below half the sampling rate."""
-    found = []
+    frequencies = []
     for plant in plants:
         a, b, *_ = plant.matrices()
         for root in np.linalg.eigvals(np.reshape(a, (len(b), len(b)))) if b else ():
             size = abs(root)
             if root.imag > 0.0 and -root.real < RINGING * size:
-                found.append(size / (2.0 * math.pi))
-    found = [one for one in found if one * dt < NYQUIST]
-    return (min(found), max(found)) if found else None
+                frequencies.append(size / (2.0 * math.pi))
+    frequencies = [one for one in frequencies if one * dt < NYQUIST]
+    return (min(frequencies), max(frequencies)) if frequencies else None
 
 
 def box_of(

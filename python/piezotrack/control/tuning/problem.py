@@ -221,15 +221,15 @@ def _references(reference: Any, kind: type) -> list[Any]:
     return references
 
 
-def _made(one: Any, kind: type) -> Any:
+def _made(path: Any, kind: type) -> Any:
     """Return a reference or a path, or make it of a text."""
-    if not isinstance(one, str):
-        expect("reference", one, kind, f"pt.{kind.__name__} or a text")
-        return one
+    if not isinstance(path, str):
+        expect("reference", path, kind, f"pt.{kind.__name__} or a text")
+        return path
     if kind is Reference:
-        return reference_of(one)
+        return reference_of(path)
     try:
-        return path_of(one)
+        return path_of(path)
     except ParameterError as error:
         raise error.of("reference", argument="reference") from None
 

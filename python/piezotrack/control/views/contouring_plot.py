@@ -113,11 +113,11 @@ def plot_contour(run: Contour, fig: Figure | SubFigure | None = None) -> Figure:
         shared = shared or ax
     contour = figure.add_subplot(grid[1, 1])
     plot_contour_error(run, contour)
-    found = run.metrics
+    metrics = run.metrics
     figure.suptitle(
         f"{literal(run.path.name)}: {_parts(run)} at {1.0 / run.x.controller.dt:.6g} Hz\n"
-        f"contour error {1e6 * found.peak_to_peak:.3f} um peak to peak, "
-        f"mean {1e6 * found.mean_error:.3f} um, SD {1e6 * found.sd_error:.3f} um",
+        f"contour error {1e6 * metrics.peak_to_peak:.3f} um peak to peak, "
+        f"mean {1e6 * metrics.mean_error:.3f} um, SD {1e6 * metrics.sd_error:.3f} um",
         fontsize="medium",
     )
     return whole(figure)

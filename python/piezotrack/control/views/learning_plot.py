@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 __all__ = ["plot_learning"]
 
 
-def plot_learning(found: Learning, fig: Figure | SubFigure | None = None) -> Figure:
+def plot_learning(learning: Learning, fig: Figure | SubFigure | None = None) -> Figure:
     """Plot errors of the first and the best trial, their tables, and the error of all trials.
 
     Parameters
     ----------
-    found : Learning
+    learning : Learning
         The learning.
     fig : matplotlib.figure.Figure or SubFigure, optional
         Where to draw; a new figure where not given.
@@ -47,39 +47,39 @@ def plot_learning(found: Learning, fig: Figure | SubFigure | None = None) -> Fig
     """
     figure = panels(fig, (7.2, 7.4))
     error, table, history = figure.subplots(3, 1)
-    count = found.learner.t.size
+    count = learning.learner.t.size
     for run, style, words in (
-        (found.first, ERROR, "first trial"),
-        (found.final, ACTUAL, f"trial {found.best}"),
+        (learning.first, ERROR, "first trial"),
+        (learning.final, ACTUAL, f"trial {learning.best}"),
     ):
         last = 1e9 * run.error[-count:]
         k = thinned(last)
-        error.plot(found.learner.t[k], last[k], **{**style, "linewidth": 1.0, "label": words})
+        error.plot(learning.learner.t[k], last[k], **{**style, "linewidth": 1.0, "label": words})
     error.axhline(0.0, **GUIDE)
     error.set(ylabel="desired less\nmeasured [nm]", xlabel="time in the trial [s]")
-    unit, scale = shown_unit(found.learner.controller.drive_unit)
-    k = thinned(found.tables[0])
-    learnt = scale * (found.table - found.learner.feedforward)
-    table.plot(found.learner.t[k], learnt[k], **{**FEEDFORWARD, "label": "learnt"})
+    unit, scale = shown_unit(learning.learner.controller.drive_unit)
+    k = thinned(learning.tables[0])
+    learnt = scale * (learning.table - learning.learner.feedforward)
+    table.plot(learning.learner.t[k], learnt[k], **{**FEEDFORWARD, "label": "learnt"})
     table.axhline(0.0, **GUIDE)
-    word = drive_word(found.learner.controller.drive_unit)
+    word = drive_word(learning.learner.controller.drive_unit)
     table.set(ylabel=f"{word} [{unit}]", xlabel="time in the trial [s]")
     for ax in (error, table):
         ax.margins(x=0)
         legend_inside(ax)
-    _history(found, history)
+    _history(learning, history)
     figure.suptitle(
-        literal(f"{found.learner.reference.name}: learnt in {len(found.trials)} trials"),
+        literal(f"{learning.learner.reference.name}: learnt in {len(learning.trials)} trials"),
         fontsize="medium",
     )
     return whole(figure)
 
 
-def _history(found: Learning, ax: Axes) -> None:
+def _history(learning: Learning, ax: Axes) -> None:
     """Draw the rms error of each trial, and the noise in it."""
-    trial = np.arange(len(found.trials))
-    ax.semilogy(trial, 1e9 * found.errors, **{**ERROR, "marker": "o", "label": "rms error"})
-    noise = [one.noise for one in found.trials if one.noise is not None]
+    trial = np.arange(len(learning.trials))
+    ax.semilogy(trial, 1e9 * learning.errors, **{**ERROR, "marker": "o", "label": "rms error"})
+    noise = [one.noise for one in learning.trials if one.noise is not None]
     if noise and max(noise) > 0.0:
         ax.axhline(1e9 * float(np.median(noise)), **{**LEVEL, "label": "what does not repeat"})
     ax.set(xlabel="trial", ylabel="rms error [nm]")

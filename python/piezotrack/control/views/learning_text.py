@@ -35,16 +35,16 @@ def trial_line(place: int, trial: LearningTrial) -> str:
     return f"{place:>5}  {rms:>9.4g}  {most:>9.4g}  {noise:>9}"
 
 
-def outcome(found: Learning) -> list[str]:
+def outcome(learning: Learning) -> list[str]:
     """Write why it ended, and whether the table is at a limit."""
-    clipped = found.trials[found.best].clipped
+    clipped = learning.trials[learning.best].clipped
     limited = f"the table is at a limit in {100.0 * clipped:.1f} % of its samples"
-    return [*([limited] if clipped > 0.0 else []), f"ended: {WHY[found.stopped]}"]
+    return [*([limited] if clipped > 0.0 else []), f"ended: {WHY[learning.stopped]}"]
 
 
-def learning_text(found: Learning) -> str:
+def learning_text(learning: Learning) -> str:
     """Write the trials, the best one marked, and how it ended."""
-    lines = [heading(found.learner)]
-    for i, trial in enumerate(found.trials):
-        lines.append(trial_line(i, trial) + (" *" if i == found.best else ""))
-    return "\n".join([*lines, *outcome(found)])
+    lines = [heading(learning.learner)]
+    for i, trial in enumerate(learning.trials):
+        lines.append(trial_line(i, trial) + (" *" if i == learning.best else ""))
+    return "\n".join([*lines, *outcome(learning)])

@@ -82,15 +82,15 @@ def schedule_text(found: Schedule) -> str:
     return "\n".join(f"{axis}\n{one}" for axis, one in zip("xy", tables, strict=True))
 
 
-def plot_schedule(found: Schedule, fig: Figure | SubFigure | None = None) -> Figure:
+def plot_schedule(schedule: Schedule, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw the errors with the fixed and with the scheduled gains over the rate."""
     figure = panels(fig, (6.4, 4.2))
     ax = figure.subplots()
-    for i, (amplitude, errors) in enumerate(zip(found.amplitudes, found.errors, strict=True)):
+    for i, (amplitude, errors) in enumerate(zip(schedule.amplitudes, schedule.errors, strict=True)):
         for column, style, words in ((0, COMMAND, "fixed"), (1, ACTUAL, "scheduled")):
             label = f"{words}, {1e6 * amplitude:g} um"
             marks = {"marker": "os^D"[i], "linestyle": ("--", "-")[column], "label": label}
-            ax.plot(found.rates, 1e6 * errors[:, column], **{**style, **marks})
+            ax.plot(schedule.rates, 1e6 * errors[:, column], **{**style, **marks})
     ax.set(xlabel="rate [Hz]", ylabel="rms error [um]", ylim=(0.0, None))
     legend_inside(ax, ncols=2)
     return whole(figure)
@@ -135,12 +135,12 @@ def _repetitive_text(part: Repetitive, unit: str, scale: float) -> str:
     )
 
 
-def _places(found: Schedule, controller: Controller) -> str:
+def _places(schedule: Schedule, controller: Controller) -> str:
     law: Any = controller.feedback
     unit, scale = shown_unit(controller.drive_unit)
     lines = [f"amplitude um  rate Hz  kp {unit}/um    ti ms    td ms   rms um: fixed, scheduled"]
-    places = [(amplitude, rate) for amplitude in found.amplitudes for rate in found.rates]
-    errors = found.errors.reshape(-1, 2)
+    places = [(amplitude, rate) for amplitude in schedule.amplitudes for rate in schedule.rates]
+    errors = schedule.errors.reshape(-1, 2)
     for (amplitude, rate), gains, (before, after) in zip(places, law.gains, errors, strict=True):
         lines.append(
             f"{1e6 * amplitude:>12g} {rate:>8g} {1e-6 * scale * gains.kp:>8.4g} "

@@ -214,14 +214,14 @@ def _rests(t: Array, u: Array, places: list[int]) -> tuple[tuple[float, float, f
     middle = maximum_filter1d(u, width) - minimum_filter1d(u, width) <= STILL * swing
     middle[: width // 2] = middle[u.size - width // 2 :] = False
     still = maximum_filter1d(middle.astype(np.int8), width) > 0
-    found = []
+    rests = []
     for first, last in runs(still):
         jumps = first + 1 + np.flatnonzero(np.abs(np.diff(u[first:last])) > STILL * swing)
         for begin, end in pairwise([first, *jumps.tolist(), last]):
             if end - begin >= width // 2:
                 level = float(np.median(u[begin:end]))
-                found.append((float(t[begin]), float(t[end - 1]), level))
-    return tuple(found)
+                rests.append((float(t[begin]), float(t[end - 1]), level))
+    return tuple(rests)
 
 
 def _mode_limit(t: Array, y: Array | None, shares: Array, lasting: Array, steps: bool) -> float:

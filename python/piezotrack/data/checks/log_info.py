@@ -191,10 +191,10 @@ class LogInfo:
             f"rate      {rate:.6g} Hz, {'even' if share < EVEN else jitter}",
         ]
         lost = sum(count for _, _, count in time.gaps)
-        found = [f"{first:.6g} to {last:.6g} s" for first, last, _ in time.gaps]
+        gaps = [f"{first:.6g} to {last:.6g} s" for first, last, _ in time.gaps]
         lines.append(
-            f"gaps      {len(time.gaps)}, {lost} samples missing: {_listed(found)}"
-            if found
+            f"gaps      {len(time.gaps)}, {lost} samples missing: {_listed(gaps)}"
+            if gaps
             else "gaps      none"
         )
         return lines
@@ -300,22 +300,22 @@ def info(
     if u is not None and plain is not None and far is not None:
         connection = unusual_connection(u, plain)
     times = time_features(t) if t is not None and t.size > 1 else None
-    found, stroke = None, None if plain is None else float(np.ptp(plain))
+    features, stroke = None, None if plain is None else float(np.ptp(plain))
     if t is not None and u is not None:
-        found = drive_features(t, u, plain, _si(roles["drive"]))
+        features = drive_features(t, u, plain, _si(roles["drive"]))
     # Of a log that is read as it is: another has no even rate, or not yet.
     spare: list[str] = []
     if times is not None and u is not None and y is not None and not problems:
-        spare = sampling_notes(u, times.interval, 0.0 if found is None else found.mode_limit)
+        spare = sampling_notes(u, times.interval, 0.0 if features is None else features.mode_limit)
     sentences: list[str] = []
     if connection is not None and not connection.follows:
         sentences = ["no model before drive and displacement go together: see the note"]
-    elif times is not None and found is not None:
-        sentences = drive_notes(times, found, stroke)
+    elif times is not None and features is not None:
+        sentences = drive_notes(times, features, stroke)
     elif stroke is not None and problems and problems[0].startswith(NO_DRIVE):
         sentences = ["no drive: the noise of a sensor at rest (piezotrack noise), or a reference"]
-    said = far_notes(t, y, far) if t is not None and y is not None and far is not None else []
-    said += [] if connection is None else [connection.note]
+    notes = far_notes(t, y, far) if t is not None and y is not None and far is not None else []
+    notes += [] if connection is None else [connection.note]
     return LogInfo(
         source=log.source.name,
         format=format_of(log.source).name,
@@ -323,10 +323,10 @@ def info(
         roles={role: column.title for role, column in roles.items()},
         problem=problems[0] if problems else "",
         time=times,
-        drive=found,
+        drive=features,
         stroke=stroke,
         determines=tuple(sentences),
-        notes=(*log.columns.notes, *lost, *said, *spare),
+        notes=(*log.columns.notes, *lost, *notes, *spare),
     )
 
 

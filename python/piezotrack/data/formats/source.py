@@ -120,8 +120,8 @@ class Source:
         What it warns of, or writes to its `logger`, is not shown: a file is read, or it is not.
         """
         talking = _loggers(logger)
-        for one in talking:
-            one.disabled = True
+        for each in talking:
+            each.disabled = True
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
@@ -137,8 +137,8 @@ class Source:
                 f"is not a sound {kind} file, or is cut off ({quoted(reason)})"
             ) from None
         finally:
-            for one in talking:
-                one.disabled = False
+            for each in talking:
+                each.disabled = False
 
     def library(self, module: str, extra: str) -> Any:
         """Import the library that reads a format.

@@ -219,9 +219,9 @@ class ChannelTable(Table):
         titled: bool = True,
         notes: Sequence[str] = (),
     ) -> None:
-        found = list(channels)
+        columns = list(channels)
         self.source = source
-        self.channels = [channel for channel in found if channel.count > 1]
+        self.channels = [channel for channel in columns if channel.count > 1]
         if not self.channels:
             raise source.error(
                 "holds no column of numbers with two samples or more: expected those of the drive "
@@ -236,7 +236,7 @@ class ChannelTable(Table):
             has_titles=titled,
         )
         self.columns.notes += notes
-        self.dt = dt if dt is not None else stated_interval(c for c in found if c.count == 1)
+        self.dt = dt if dt is not None else stated_interval(c for c in columns if c.count == 1)
 
     def count(self, column: Column) -> int:
         """Return the number of samples of a column."""

@@ -51,7 +51,7 @@ def dahl_inverse(
     largest = 3e38 if single else sys.float_info.max
     longest = piece if math.isfinite(piece) else largest
     delayed = delay > 0.0
-    own = [
+    delays = [
         Constant("INVERSE_INERTIA", inertia, f"M/T, {unit} s^2/m"),
         Constant("INVERSE_DAMPING", damping, f"D/T, {unit} s/m"),
         Constant("INVERSE_STIFFNESS", stiffness, f"K/T, {unit}/m"),
@@ -64,15 +64,15 @@ def dahl_inverse(
         Constant("REFERENCE_OFFSET", offset, "reading of the sensor at rest, m"),
     ]
     if delayed:
-        own.append(Constant("REFERENCE_DELAY", delay, "delay that is compensated, s"))
-        own.append(Constant("REFERENCE_HALF_DELAY", 0.5 * delay, "half of it, s"))
+        delays.append(Constant("REFERENCE_DELAY", delay, "delay that is compensated, s"))
+        delays.append(Constant("REFERENCE_HALF_DELAY", 0.5 * delay, "half of it, s"))
     code = "".join((_root(single=single), along, STEP_CODE, REMEMBER_CODE, ONLINE_CODE))
     code = code.replace("@x", AHEAD if delayed else NOW)
     code = code.replace("@v", "v + REFERENCE_DELAY * a" if delayed else "v")
     ahead = Operations(4, 3) if delayed else Operations()
     return Part(
         title="feedforward: inverse of a Dahl stage, sample by sample",
-        constants=(*own, *constants),
+        constants=(*delays, *constants),
         fields=(
             Field("inverse", "inverse", "state of the inverse"),
             Field("inverse", "before", "the same before the last sample"),

@@ -146,14 +146,14 @@ def _law_code(shape: Shape) -> str:
     """Write the call of the law within a step."""
     if not shape.law:
         return ""
-    told = {
+    lines_of = {
         "measured": "",
         "applied": "        in.applied = applied;\n",
         "feedforward": "        in.feedforward = used"
         + (" + repetitive" if shape.repeats else "")
         + ";\n",
     }
-    lines = "".join(told[one] for one in shape.sample)
+    lines = "".join(lines_of[one] for one in shape.sample)
     return LAW.replace("@told", lines).replace("@law", shape.law)
 
 

@@ -48,13 +48,13 @@ MOST_SAMPLES = 1_000_000
 
 def coefficients_of(controller: Controller) -> Numbers:
     """Return the numbers of every part as it is sampled, by name; of the filters a list."""
-    found: Numbers = {"filters": []}
+    numbers_of: Numbers = {"filters": []}
     for name, numbers in controller._core.coefficients():
         if name == "filter":
-            found["filters"].append(numbers)
+            numbers_of["filters"].append(numbers)
         else:
-            found[name] = numbers
-    return found
+            numbers_of[name] = numbers
+    return numbers_of
 
 
 def feedforward_table(
@@ -137,7 +137,7 @@ def shape_of(controller: Controller, table: Sequence[float] | None) -> Shape:
         A part has no form in C.
     """
     learner = controller.repetitive
-    name, told = _law_of(controller)
+    name, sample = _law_of(controller)
     forward = "given"
     if table is not None:
         forward = "table"
@@ -146,7 +146,7 @@ def shape_of(controller: Controller, table: Sequence[float] | None) -> Shape:
         forward = "online"
     return Shape(
         law=name,
-        sample=told,
+        sample=sample,
         repeats=learner is not None,
         pauses=learner is not None and learner.pause,
         filtered=bool(controller.filters),
@@ -233,10 +233,10 @@ def parts_of(
     elif shape.forward == "online":
         inverse = controller.feedforward
         assert inverse is not None
-        own = inverse._begun(controller.dt).coefficients()
-        assert own is not None
+        coefficients = inverse._begun(controller.dt).coefficients()
+        assert coefficients is not None
         settings = (float(controller.dt), float(inverse.offset), float(inverse.delay))
-        parts.append(dahl_inverse(own, *settings, unit, single=single))
+        parts.append(dahl_inverse(coefficients, *settings, unit, single=single))
     parts.append(loop(controller.limits, unit, shape))
     others = "".join(one.code for one in parts)
     return helpers(controller.limits, unit, others, single=single), *parts

@@ -194,10 +194,10 @@ def _header(parts: tuple[Part, ...], facts: str, forward: str, unit: str, *, sin
 
 def _source(parts: tuple[Part, ...], facts: str, *, single: bool) -> str:
     sections = []
-    for one in parts:
-        constants = "".join(constant_text(c, single=single) for c in one.constants)
-        between = "\n" if constants and one.code else ""
-        sections.append(f"/* ---- {one.title} ---- */\n\n{constants}{between}{one.code}")
+    for part in parts:
+        constants = "".join(constant_text(c, single=single) for c in part.constants)
+        between = "\n" if constants and part.code else ""
+        sections.append(f"/* ---- {part.title} ---- */\n\n{constants}{between}{part.code}")
     return SOURCE_TEXT.replace("@facts", facts) + "\n".join(sections)
 
 

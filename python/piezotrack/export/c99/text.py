@@ -178,15 +178,15 @@ def _short(value: float) -> str:
     return re.sub(r"\.?0*p", "p", value.hex(), count=1)
 
 
-def constant_text(one: Constant, *, single: bool) -> str:
+def constant_text(constant: Constant, *, single: bool) -> str:
     """Write the definition of a constant, with what it is above."""
-    above = f"/* {one.comment} */\n"
-    if isinstance(one.value, (int, float)):
-        number = literal(one.value, one.name, single=single)
-        return f"{above}static const real {one.name} = {number.replace(' /*', '; /*', 1)}\n"
-    numbers = [literal(value, one.name, single=single) for value in one.value]
+    above = f"/* {constant.comment} */\n"
+    if isinstance(constant.value, (int, float)):
+        number = literal(constant.value, constant.name, single=single)
+        return f"{above}static const real {constant.name} = {number.replace(' /*', '; /*', 1)}\n"
+    numbers = [literal(value, constant.name, single=single) for value in constant.value]
     size, body = len(numbers), array_lines(numbers)
-    return f"{above}static const real {one.name}[{size}] = {{\n{body}\n}};\n"
+    return f"{above}static const real {constant.name}[{size}] = {{\n{body}\n}};\n"
 
 
 def array_lines(numbers: Iterable[str]) -> str:
@@ -208,10 +208,10 @@ TYPES = {
 OF_INVERSE = 5
 
 
-def field_text(one: Field) -> str:
+def field_text(field: Field) -> str:
     """Write the declaration of a field."""
-    array = f"[{one.entries}]" if one.entries else ""
-    return f"    {TYPES[one.kind]} {one.name}{array}; /* {one.comment} */\n"
+    array = f"[{field.entries}]" if field.entries else ""
+    return f"    {TYPES[field.kind]} {field.name}{array}; /* {field.comment} */\n"
 
 
 def in_order(fields: Iterable[Field]) -> list[Field]:

@@ -85,15 +85,15 @@ def compiler() -> list[str]:
             "expected to='c99', whose sources every machine compiles",
             argument="to",
         )
-    asked = os.environ.get("CC", "").split()
-    if asked and shutil.which(asked[0]) is None:
+    command = os.environ.get("CC", "").split()
+    if command and shutil.which(command[0]) is None:
         raise ParameterError(
             "CC",
-            f"{quoted(asked[0])}, which cannot be run",
+            f"{quoted(command[0])}, which cannot be run",
             "the name of a C compiler, or no CC in the environment",
         )
-    if asked:
-        return asked
+    if command:
+        return command
     for name in ("gcc", "cc", "clang"):
         if found := shutil.which(name):
             return [found]
@@ -207,15 +207,16 @@ def _description(controller: Controller, sources: Sources, digest: str, unit: st
 """
 
 
-def _scalar(one: Variable) -> str:
-    kind = "Boolean" if one.number >= FLAGS_FROM else "Real"
-    unit = f" unit={quoteattr(one.unit)}" if one.unit else ""
+def _scalar(variable: Variable) -> str:
+    kind = "Boolean" if variable.number >= FLAGS_FROM else "Real"
+    unit = f" unit={quoteattr(variable.unit)}" if variable.unit else ""
     start = ""
-    if one.causality == "input":
-        start = ' start="1e300"' if one.name == "applied" else ' start="0"'
+    if variable.causality == "input":
+        start = ' start="1e300"' if variable.name == "applied" else ' start="0"'
     return (
-        f"    <ScalarVariable name={quoteattr(one.name)} "
-        f'valueReference="{one.number}" causality="{one.causality}" variability="discrete" '
-        f"description={quoteattr(one.text)}>\n      <{kind}{unit}{start}/>\n"
+        f"    <ScalarVariable name={quoteattr(variable.name)} "
+        f'valueReference="{variable.number}" causality="{variable.causality}" '
+        'variability="discrete" '
+        f"description={quoteattr(variable.text)}>\n      <{kind}{unit}{start}/>\n"
         "    </ScalarVariable>"
     )

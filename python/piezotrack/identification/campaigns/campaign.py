@@ -127,12 +127,12 @@ def campaign(
             for seed in (numbers if problem.is_searched else [None])
         )
     ]
-    found = {task.name: place.result(task.name) for task in planned}
+    documents = {task.name: place.result(task.name) for task in planned}
     missing = [
-        task for task in planned if (found[task.name] or {}).get("format") in (None, FAILURE)
+        task for task in planned if (documents[task.name] or {}).get("format") in (None, FAILURE)
     ]
     if missing:
-        found |= compute(missing, executor, place, len(planned), progress)
+        documents |= compute(missing, executor, place, len(planned), progress)
     results = [
         TaskResult(
             record=task.record,
@@ -142,7 +142,7 @@ def campaign(
             document=document,
         )
         for task in planned
-        if (document := found[task.name]) is not None
+        if (document := documents[task.name]) is not None
     ]
     return Campaign(results=tuple(results), folder=place.path)
 
@@ -236,9 +236,9 @@ def _seeds(seeds: object) -> list[int]:
     """Check the seeds."""
     if not has_entries(seeds):
         raise ParameterError("seeds", quoted(seeds), "several in a list, as [0, 1] or range(10)")
-    found = [_core.as_count("seeds", seed) for seed in seeds]
-    if not found:
+    counts = [_core.as_count("seeds", seed) for seed in seeds]
+    if not counts:
         raise ParameterError("seeds", "empty", "one or more")
-    if twice := [seed for i, seed in enumerate(found) if seed in found[:i]]:
+    if twice := [seed for i, seed in enumerate(counts) if seed in counts[:i]]:
         raise ParameterError("seeds", f"{twice[0]} twice", "it once", verb="has")
-    return found
+    return counts

@@ -65,19 +65,19 @@ class CampaignFolder:
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             raise DataError(f"folder {self.path} cannot be read: {reason}") from None
-        found = parse_json(str(self.path / NAME), content)
-        if not isinstance(found, dict) or found.get("format") != FORMAT:
+        document = parse_json(str(self.path / NAME), content)
+        if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise DataError(
                 f"{self.path / NAME} is not that of a campaign: its 'format' is not '{FORMAT}'"
             )
-        if (version := found.get("schema_version")) != SCHEMA_VERSION or version is True:
+        if (version := document.get("schema_version")) != SCHEMA_VERSION or version is True:
             raise DataError(
                 f"{self.path / NAME} has schema_version {quoted(version)}: this version of "
                 f"piezotrack reads {SCHEMA_VERSION}"
             )
-        if not all(isinstance(found.get(name), dict) for name in ("records", "models")):
+        if not all(isinstance(document.get(name), dict) for name in ("records", "models")):
             raise DataError(f"{self.path / NAME}: an entry is not of the form that is written")
-        return found
+        return document
 
     def begin(
         self, records: Mapping[str, tuple[str, Dataset]], models: Mapping[str, dict[str, Any]]
@@ -97,7 +97,7 @@ class CampaignFolder:
             The folder is that of another campaign, which has none of these records or other
             settings under the title of a model; or it cannot be written to.
         """
-        known, said = self.document.get("records", {}), self.document.get("models", {})
+        known, titled = self.document.get("records", {}), self.document.get("models", {})
         if known and not known.keys() & records.keys():
             titles = [one.get("title") if isinstance(one, dict) else None for one in known.values()]
             raise DataError(
@@ -106,13 +106,13 @@ class CampaignFolder:
                 "given: expected another folder, or one of these records too"
             )
         for title, settings in models.items():
-            if said.get(title, settings) not in (settings, json_ready(settings)) and any(
+            if titled.get(title, settings) not in (settings, json_ready(settings)) and any(
                 document["format"] == MODEL and document["campaign"].get("model") == title
                 for document in self.results()
             ):
                 raise DataError(
                     f"folder {self.path} has the model '{title}' with other settings, "
-                    f"{quoted(said[title])}: expected another folder, or another title"
+                    f"{quoted(titled[title])}: expected another folder, or another title"
                 )
         new = {
             key: {
@@ -131,7 +131,7 @@ class CampaignFolder:
                 "schema_version": SCHEMA_VERSION,
                 "version": _core.__version__,
                 "records": {**known, **new},
-                "models": {**said, **models},
+                "models": {**titled, **models},
             }
         )
         if document != self.document:
@@ -163,14 +163,14 @@ class CampaignFolder:
             reason = (error.strerror or str(error)).lower()
             raise DataError(f"{self.file(task)} cannot be read: {reason}") from None
         try:
-            found = parse_json(self.file(task).name, content)
+            document = parse_json(self.file(task).name, content)
         except DataError:
             # Nobody but a failing disk or an editor has written that: it is computed again.
             return None
-        if not isinstance(found, dict) or found.get("format") not in (MODEL, FAILURE):
+        if not isinstance(document, dict) or document.get("format") not in (MODEL, FAILURE):
             return None
-        entry = found.get("campaign")
-        return found if isinstance(entry, dict) and entry.get("task") == task else None
+        entry = document.get("campaign")
+        return document if isinstance(entry, dict) and entry.get("task") == task else None
 
     def results(self) -> Iterable[dict[str, Any]]:
         """Read the results of all tasks, the oldest file first."""

@@ -98,7 +98,7 @@ class TaskResult:
     @property
     def row(self) -> dict[str, Any]:
         """The figures by title, with their units, and the parameters that are numbers."""
-        own = {
+        values = {
             "record": self.record,
             "model": self.model,
             "kind": self.kind,
@@ -116,14 +116,14 @@ class TaskResult:
         }
         for name, entry in self.document.get("parameters", {}).items():
             if isinstance(entry["value"], (int, float)):
-                own["_".join(filter(None, (name, entry["unit"])))] = entry["value"]
-        return own
+                values["_".join(filter(None, (name, entry["unit"])))] = entry["value"]
+        return values
 
     def _number(self, *path: str) -> float:
-        found: Any = self.document
+        value: Any = self.document
         for name in path:
-            found = found.get(name) if isinstance(found, Mapping) else None
-        return float("nan") if found is None else float(found)
+            value = value.get(name) if isinstance(value, Mapping) else None
+        return float("nan") if value is None else float(value)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

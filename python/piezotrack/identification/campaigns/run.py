@@ -89,18 +89,18 @@ def compute(
     Interrupted
         Ctrl-C.
     """
-    found: dict[str, Document] = {}
+    documents: dict[str, Document] = {}
     failed = 0
 
     def keep(planned: Planned, document: Document) -> None:
         nonlocal failed
         document["campaign"] |= {"record": planned.record, "model": planned.model}
         place.store(document)
-        found[planned.name] = document
+        documents[planned.name] = document
         failed += document["format"] == FAILURE
 
     def done() -> int:
-        return total - len(missing) + len(found)
+        return total - len(missing) + len(documents)
 
     def so_far() -> str:
         return f"{done()} of {total} results are in {place.path}, run it again for the others"
@@ -122,12 +122,12 @@ def compute(
         finally:
             run.cancel()
     if run.trouble is not None:
-        lost = len(missing) - len(found)
+        lost = len(missing) - len(documents)
         tasks = "1 task" if lost == 1 else f"{lost} tasks"
         raise ExecutorError(
             f"executor did not return {tasks}, {_reason(run.trouble)}: {so_far()}"
         ) from run.trouble
-    return found
+    return documents
 
 
 @contextmanager

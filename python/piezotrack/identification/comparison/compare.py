@@ -293,10 +293,10 @@ def compare(
         ]
     )
     for i, (name, title, source) in enumerate(wanted):
-        found: IdentifiedModel
+        fitted: IdentifiedModel
         if isinstance(source, ModelInfo):
             with parts.begin(i):
-                found = identify(
+                fitted = identify(
                     first,
                     source.name,
                     history=history,
@@ -305,8 +305,8 @@ def compare(
                     progress=progress,
                 )
         else:
-            found = source
-        rows.append(_compared(name, title, found, first, second, carried))
+            fitted = source
+        rows.append(_compared(name, title, fitted, first, second, carried))
     return Comparison(rows=tuple(rows), train=first, test=second, carried=carried)
 
 

@@ -36,9 +36,9 @@ def parts_of(log: Dataset, train: object, test: object) -> tuple[Dataset, Datase
     """
     first = _bounds("train", train)
     if isinstance(test, Dataset):
-        one = _windowed("train", log, first)
-        _check_apart(one, test)
-        return one, test, False
+        fitted = _windowed("train", log, first)
+        _check_apart(fitted, test)
+        return fitted, test, False
     second = _bounds("test", test)
     if train is None and test is None:
         middle = float(log.t[len(log) // 2])
@@ -61,9 +61,9 @@ def parts_of(log: Dataset, train: object, test: object) -> tuple[Dataset, Datase
                 verb="goes",
             )
         second = (first[1], None)
-    one, two = _windowed("train", log, first), _windowed("test", log, second)
-    _check_apart(one, two)
-    return one, two, True
+    fitted, two = _windowed("train", log, first), _windowed("test", log, second)
+    _check_apart(fitted, two)
+    return fitted, two, True
 
 
 def _check_apart(train: Dataset, test: Dataset) -> None:

@@ -475,15 +475,15 @@ def identify_step(
 
 def _read(log: Dataset) -> tuple[StepReadings, StepTrace]:
     """Read a record in the core."""
-    found = _core.read_step(log.u, log.y, log.dt, log.hold)
-    voltage, steady, period, frequency, static, resonance, slope = found.readings()
-    before, samples_before, end = found.samples
-    rest, noise, decays, creep = found.quality
-    frequencies, gains = found.spectrum()
+    step = _core.read_step(log.u, log.y, log.dt, log.hold)
+    voltage, steady, period, frequency, static, resonance, slope = step.readings()
+    before, samples_before, end = step.samples
+    rest, noise, decays, creep = step.quality
+    frequencies, gains = step.spectrum()
     readings = StepReadings(
         voltage=voltage,
         steady_state=steady,
-        peaks=found.peaks,
+        peaks=step.peaks,
         period=period,
         frequency=frequency,
         static_gain=static,
@@ -496,10 +496,10 @@ def _read(log: Dataset) -> tuple[StepReadings, StepTrace]:
         step_time=float(log.t[before]),
         end_time=float(log.t[end - 1]),
         rest=rest,
-        peak_times=tuple(start + time for time in found.peak_times),
+        peak_times=tuple(start + time for time in step.peak_times),
         noise=noise,
         samples_before=samples_before,
-        cut=found.cut,
+        cut=step.cut,
         decays=decays,
         creep=creep,
         frequencies=frequencies,

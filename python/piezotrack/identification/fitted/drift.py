@@ -208,12 +208,12 @@ def drift_of(entry: Any) -> Drift | None:
     """
     if entry is None:
         return None
-    found = object_of("drift", entry)
+    drift = object_of("drift", entry)
     values = {
-        name: _core.as_number(f"drift: {name}", object_of(f"drift: {name}", found[name])["value"])
+        name: _core.as_number(f"drift: {name}", object_of(f"drift: {name}", drift[name])["value"])
         for name in ("amplitude", "begin", "end")
     }
-    time = object_of("drift: time", found["time"])
+    time = object_of("drift: time", drift["time"])
     for name, most in (("amplitude", LARGEST), ("begin", LATEST), ("end", LATEST)):
         if not abs(values[name]) < most:
             raise ParameterError(f"drift: {name}", f"{values[name]:g}", f"a number below {most:g}")

@@ -115,7 +115,7 @@ def record_entries(records: Sequence[FittedRecord], unit: str) -> dict[str, Any]
     """
     if len(records) < 2:
         return {}
-    found = [
+    entries = [
         {
             "weight": record.weight,
             "delay": {"value": record.delay, "unit": "s"},
@@ -128,7 +128,7 @@ def record_entries(records: Sequence[FittedRecord], unit: str) -> dict[str, Any]
         }
         for record in records
     ]
-    return {"records": found}
+    return {"records": entries}
 
 
 def records_of_file(entries: Any, state: type[StageState]) -> tuple[FittedRecord, ...]:
@@ -159,10 +159,10 @@ def records_of_file(entries: Any, state: type[StageState]) -> tuple[FittedRecord
 
 
 def _record(name: str, entry: Any, state: type[StageState]) -> FittedRecord:
-    found = object_of(name, entry)
+    record = object_of(name, entry)
 
     def number(key: str, unit: str) -> float:
-        value = found[key]
+        value = record[key]
         if value.get("unit") != unit:
             raise ParameterError(
                 f"the unit of {name}: {key}", f"{value.get('unit')!r}", f"{unit!r}"
@@ -170,13 +170,13 @@ def _record(name: str, entry: Any, state: type[StageState]) -> FittedRecord:
         return _core.as_number(f"{name}: {key}", value["value"])
 
     return FittedRecord(
-        weight=_core.as_number(f"{name}: weight", found["weight"]),
+        weight=_core.as_number(f"{name}: weight", record["weight"]),
         delay=number("delay", "s"),
         offset=number("offset", "m"),
-        offset_fitted=_core.as_truth(f"{name}: offset fitted", found["offset"]["fitted"]),
-        start=start_of(found["start"], state),
-        drift=drift_of(found.get("drift")),
+        offset_fitted=_core.as_truth(f"{name}: offset fitted", record["offset"]["fitted"]),
+        start=start_of(record["start"], state),
+        drift=drift_of(record.get("drift")),
         cost=number("cost", "m"),
         stroke=number("stroke", "m"),
-        origin=object_of(f"{name}: data", found["data"]),
+        origin=object_of(f"{name}: data", record["data"]),
     )

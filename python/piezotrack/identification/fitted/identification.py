@@ -98,7 +98,7 @@ class Identification(IdentifiedModel):
     def __post_init__(self) -> None:
         if not self.records:
             # One record, whose own are those of the result.
-            own = FittedRecord(
+            record = FittedRecord(
                 data=self.data,
                 delay=self.delay,
                 offset=self.offset,
@@ -109,7 +109,7 @@ class Identification(IdentifiedModel):
                 stroke=self.stroke,
                 origin=self._record,
             )
-            object.__setattr__(self, "records", (own,))
+            object.__setattr__(self, "records", (record,))
 
     def __repr__(self) -> str:
         return (

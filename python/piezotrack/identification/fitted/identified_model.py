@@ -119,10 +119,10 @@ class IdentifiedModel(Result):
     @property
     def drive_range(self) -> tuple[float, float] | None:
         """Lowest and highest drive of the records identified; None if the file has none."""
-        found = [one["drive_range"] for one in self._origins if one.get("drive_range")]
-        if not found:
+        ranges = [one["drive_range"] for one in self._origins if one.get("drive_range")]
+        if not ranges:
             return None
-        return float(min(low for low, _ in found)), float(max(high for _, high in found))
+        return float(min(low for low, _ in ranges)), float(max(high for _, high in ranges))
 
     @property
     def drive_unit(self) -> str:
@@ -199,11 +199,11 @@ class IdentifiedModel(Result):
         Thresholds and time constants chosen beforehand are not counted; a weight that was found
         to be 0 is.
         """
-        found = self.details.get("parameters", {})
-        if not any("free" in entry for entry in found.values()):
+        entries = self.details.get("parameters", {})
+        if not any("free" in entry for entry in entries.values()):
             return None
         names = self.model.parameter_names()
-        free = [name for name in names if found.get(name, {}).get("free", False)]
+        free = [name for name in names if entries.get(name, {}).get("free", False)]
         delay = bool(self.details.get("delay", {}).get("free", False))
         offsets = int(self.offset_fitted) + sum(one.offset_fitted for one in self.records[1:])
         drifts = [one for one in (self.drift, *(one.drift for one in self.records[1:])) if one]
@@ -446,11 +446,11 @@ class IdentifiedModel(Result):
         x = self._run(data, history, initial).x
         drift, shift = self._added(data, x, offset)
         error = data.counted(data.y - x - drift - shift)
-        own, largest = self._own(data), int(np.abs(error).argmax())
+        record, largest = self._own(data), int(np.abs(error).argmax())
         return Score(
             rms=float(np.sqrt(np.mean(error**2))),
             max_error=float(abs(error[largest])),
-            stroke=self.stroke if own is None else own.stroke,
+            stroke=self.stroke if record is None else record.stroke,
             offset=shift,
             spread=float(np.std(data.counted(data.y))),
             notes=(*self.extrapolation_notes(data.u, data.dt), *data.far_notes),
@@ -639,10 +639,10 @@ class IdentifiedModel(Result):
             Of numbers, texts, lists and dicts only.
         """
         details, info = dict(self.details), self.model.info
-        found = details.pop("parameters", {})
+        kept = details.pop("parameters", {})
         delay = dict(details.pop("delay", {}))
         parameters = {
-            name: entry | dict(found.get(name, {}))
+            name: entry | dict(kept.get(name, {}))
             for name, entry in parameter_entries(self.model, self.drive_unit).items()
         }
         return {

@@ -186,19 +186,19 @@ def start_of(entry: Any, state: type[StageState]) -> Start | None:
     ParameterError
         The entry is not that of a start.
     """
-    found = object_of("start", entry)
-    if not found:
+    start = object_of("start", entry)
+    if not start:
         return None
-    begun = state_of("start: state", found["state"], state)
-    history = checked_history(found["history"])
+    begun = state_of("start: state", start["state"], state)
+    history = checked_history(start["history"])
     if history is None:
         raise ParameterError("start: history", "None", "'virgin', 'settled' or 'fit'")
-    volts = found["voltage"]["value"]
+    volts = start["voltage"]["value"]
     return Start(
         history=history,
         state=begun,
         voltage=None if volts is None else _core.as_number("start: voltage", volts),
-        record=text_of("start: record", found["record"]) or "",
+        record=text_of("start: record", start["record"]) or "",
     )
 
 
@@ -431,11 +431,11 @@ class _Search:
                 columns += [np.exp(-t / time) for time in np.array(self.model.creep_times)[used]]
         if columns:
             basis = np.stack(columns, axis=1)
-            found = np.linalg.lstsq(basis, rest, rcond=1e-10)[0]
-            rest = rest - basis @ found
+            weighted = np.linalg.lstsq(basis, rest, rcond=1e-10)[0]
+            rest = rest - basis @ weighted
             if used.any():
                 moved = np.zeros(weights.size)
                 with np.errstate(over="ignore"):
-                    moved[used] = found[-int(used.sum()) :] / weights[used]
+                    moved[used] = weighted[-int(used.sum()) :] / weights[used]
                 start = replace(start, state=_moved(start.state, weights, moved))
         return start, float(np.sqrt(np.mean(rest**2)))

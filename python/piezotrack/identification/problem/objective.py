@@ -161,11 +161,11 @@ class Objective:
         ParameterError
             As for a call.
         """
-        found = self._core.descend(_rows(places))
+        descents = self._core.descend(_rows(places))
         return (
-            np.array([place for place, _, _ in found]),
-            np.array([cost for _, cost, _ in found]),
-            np.array([nfev for _, _, nfev in found]),
+            np.array([place for place, _, _ in descents]),
+            np.array([cost for _, cost, _ in descents]),
+            np.array([nfev for _, _, nfev in descents]),
         )
 
     def parameters(self, place: ArrayLike) -> dict[str, float]:

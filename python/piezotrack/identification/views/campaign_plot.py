@@ -96,10 +96,10 @@ def _costs(campaign: Campaign, ax: Axes) -> None:
     for model in campaign.models:
         x, y = [], []
         for (record, title), group in groups.items():
-            found = [one.rms_percent for one in group if one.error is None]
+            finite = [one.rms_percent for one in group if one.error is None]
             if title == model:
-                x += found
-                y += [places[record, title]] * len(found)
+                x += finite
+                y += [places[record, title]] * len(finite)
         ax.plot(x, y, label=literal(model), **_style(campaign, model))
     low, high = (min(costs), max(costs)) if costs else (0.0, 1.0)
     if low > 0.0 and high > 10.0 * low:
@@ -129,11 +129,11 @@ def _apart(campaign: Campaign, ax: Axes) -> None:
     for model in campaign.models:
         x, y = [], []
         for (record, title), group in campaign.groups.items():
-            found = [one.rms for one in group if one.error is None]
-            if title == model and len(found) > 1:
-                above = 100.0 * (np.array(found) / (min(found) or 1.0) - 1.0)
+            costs = [one.rms for one in group if one.error is None]
+            if title == model and len(costs) > 1:
+                above = 100.0 * (np.array(costs) / (min(costs) or 1.0) - 1.0)
                 x += list(np.maximum(above, EQUAL))
-                y += [places[record, title]] * len(found)
+                y += [places[record, title]] * len(costs)
         ax.plot(x, y, **_style(campaign, model))
     ax.set_xscale("log")
     ax.set_xlim(left=0.5 * EQUAL)

@@ -77,15 +77,15 @@ def _heading(campaign: Campaign) -> str:
 
 def _row(record: str, model: str, group: list[TaskResult]) -> tuple[str, ...]:
     """Write the seeds of one record and model."""
-    found = [one for one in group if one.error is None]
+    fitted = [one for one in group if one.error is None]
     count = "-" if group[0].seed is None else str(len(group))
-    if not found:
+    if not fitted:
         return record, model, count, "-", "-", "-", "0", "no model"
-    costs = [one.rms_percent for one in found]
+    costs = [one.rms_percent for one in fitted]
     if len(group) == 1:
         # Nothing to compare it with.
-        return record, model, count, f"{costs[0]:.4g}", "-", "-", "-", found[0].kind or ""
-    models = ", ".join(sorted({one.kind or "" for one in found}))
+        return record, model, count, f"{costs[0]:.4g}", "-", "-", "-", fitted[0].kind or ""
+    models = ", ".join(sorted({one.kind or "" for one in fitted}))
     figures = (f"{value:.4g}" for value in (min(costs), median(costs), max(costs)))
     return record, model, count, *figures, str(_agreeing(group)), models
 

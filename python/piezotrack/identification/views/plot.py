@@ -360,14 +360,14 @@ def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
     return whole(figure)
 
 
-def what_was_fitted(fit: Identification, own: FittedRecord | None = None) -> str:
+def what_was_fitted(fit: Identification, fitted: FittedRecord | None = None) -> str:
     """Write model, record, window and error of a fit, as the title of its pictures.
 
     Parameters
     ----------
     fit : Identification
         The fit.
-    own : FittedRecord, optional
+    fitted : FittedRecord, optional
         Which of its records; the first where not given.
 
     Returns
@@ -375,9 +375,9 @@ def what_was_fitted(fit: Identification, own: FittedRecord | None = None) -> str
     str
         One line.
     """
-    own = fit.records[0] if own is None else own
-    record = fit.data if own.data is None else own.data
-    return f"{named(fit, record)}: {own.cost_percent:.3g} % of stroke rms"
+    fitted = fit.records[0] if fitted is None else fitted
+    record = fit.data if fitted.data is None else fitted.data
+    return f"{named(fit, record)}: {fitted.cost_percent:.3g} % of stroke rms"
 
 
 def what_was_shown(model: IdentifiedModel, record: Dataset, run: Response) -> str:

@@ -61,22 +61,22 @@ def of_stage(model: IdentifiedModel) -> list[Row]:
         Name, and value with its unit.
     """
     stage = model.model
-    found = [*_loop(model), *_creep(stage)]
+    rows = [*_loop(model), *_creep(stage)]
     lag = stage.damping / stage.stiffness if hasattr(stage, "stiffness") else stage.time_constant
     if lag:
-        found.append(("lag", f"{1e3 * lag:.3g} ms"))
+        rows.append(("lag", f"{1e3 * lag:.3g} ms"))
     if getattr(stage, "frequency", None) is not None:
         modes = [stage.frequency, *stage.mode_frequencies]
-        found.append(("mode", f"{', '.join(f'{one:.4g}' for one in modes)} Hz"))
-    return found
+        rows.append(("mode", f"{', '.join(f'{one:.4g}' for one in modes)} Hz"))
+    return rows
 
 
-def of_sensor(own: FittedRecord | IdentifiedModel, data: Dataset | None = None) -> list[Row]:
+def of_sensor(sensor: FittedRecord | IdentifiedModel, data: Dataset | None = None) -> list[Row]:
     """Return delay, drift, offset and beginning of a record, those that it has.
 
     Parameters
     ----------
-    own : FittedRecord or IdentifiedModel
+    sensor : FittedRecord or IdentifiedModel
         What belongs to the record.
     data : Dataset, optional
         The record, where it is there.
@@ -86,16 +86,16 @@ def of_sensor(own: FittedRecord | IdentifiedModel, data: Dataset | None = None) 
     list of (str, str)
         Name, and value with its unit.
     """
-    found: list[Row] = []
-    if own.delay or "delay" in getattr(own, "parameters", {}):
-        found.append(("delay", f"{1e3 * own.delay:.4g} ms{_spread(own)}"))
-    if own.drift:
-        found.append(("drift", _drift(own.drift)))
-    if own.offset_fitted:
-        found.append(("offset", f"{1e6 * own.offset:.5g} um, fitted"))
-    if data is not None and (begun := start_notes(own.start, data)):
-        found.append(("start", begun))
-    return found
+    rows: list[Row] = []
+    if sensor.delay or "delay" in getattr(sensor, "parameters", {}):
+        rows.append(("delay", f"{1e3 * sensor.delay:.4g} ms{_spread(sensor)}"))
+    if sensor.drift:
+        rows.append(("drift", _drift(sensor.drift)))
+    if sensor.offset_fitted:
+        rows.append(("offset", f"{1e6 * sensor.offset:.5g} um, fitted"))
+    if data is not None and (begun := start_notes(sensor.start, data)):
+        rows.append(("start", begun))
+    return rows
 
 
 def errors_of(fit: Identification, i: int) -> list[Row]:
@@ -161,11 +161,11 @@ def _loop(model: IdentifiedModel) -> list[Row]:
     unit, scale = shown_unit(f"m/{per}")
     if unit == "m/N":
         unit, scale = "um/N", 1e6
-    found = [("gain", f"{scale * loop.gain:.4g} {unit}")]
+    rows = [("gain", f"{scale * loop.gain:.4g} {unit}")]
     if loop.width > CLOSED * abs(loop.travel):
         share = f"{loop.width_percent:.3g} % of the travel"
-        found.append(("hysteresis", f"{share}, {length_text(loop.width, 3)}"))
-    return found
+        rows.append(("hysteresis", f"{share}, {length_text(loop.width, 3)}"))
+    return rows
 
 
 def _creep(stage: Any) -> list[Row]:

@@ -292,18 +292,18 @@ def parameter_notes(fit: Identification, name: str) -> str:
     str
         Behind a standard deviation, beginning with a comma; empty where there is nothing.
     """
-    estimate, said = fit.parameters[name], []
+    estimate, notes = fit.parameters[name], []
     if estimate.at_bound:
         on = any(one.active and name in (one.lower, one.upper) for one in fit.constraints)
-        said.append("on a constraint" if on else "on a bound")
+        notes.append("on a constraint" if on else "on a bound")
     if fit.search and name in fit.search.scales:
-        said.append(f"{fit.search.scales[name]} scale")
+        notes.append(f"{fit.search.scales[name]} scale")
     if estimate.tie is not None:
-        said.append(f"tied: {estimate.tie}")
+        notes.append(f"tied: {estimate.tie}")
     if estimate.prior is not None:
         mean, width = estimate.prior
-        said.append(f"prior {mean:.6g} +- {width:.4g} {estimate.unit}".rstrip())
-    return "".join(f", {one}" for one in said)
+        notes.append(f"prior {mean:.6g} +- {width:.4g} {estimate.unit}".rstrip())
+    return "".join(f", {one}" for one in notes)
 
 
 def _row(fit: Identification, name: str, estimate: Estimate, width: int) -> str:

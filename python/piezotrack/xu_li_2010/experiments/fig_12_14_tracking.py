@@ -49,13 +49,13 @@ def antiwindup(apparatus: Apparatus, inverse: Inverse, part: float = 1.0) -> Run
     return {
         name: track(
             apparatus.x,
-            one,
+            loop,
             shrunk(part),
             timing=apparatus.timing,
             beyond_reach=True,
             unstable=True,
         )
-        for name, one in loops.items()
+        for name, loop in loops.items()
     }
 
 
@@ -76,12 +76,12 @@ def repetitive(apparatus: Apparatus, inverse: Inverse, part: float = 1.0) -> Run
 
 def observe_compensation(twelve: Runs, *, true: bool = False) -> dict[str, float]:
     """Compute the published quantities of Fig. 12, SI; `true` as for `observe`."""
-    found = {f"{name}.max": run.score(true=true).max_error for name, run in twelve.items()}
+    values = {f"{name}.max": run.score(true=true).max_error for name, run in twelve.items()}
     for name in ("back", "both"):
         metrics = twelve[name].score(true=true)
-        found[f"{name}.lag"] = metrics.phase_lag or 0.0
-        found[f"{name}.loop"] = metrics.widest_loop or 0.0
-    return found
+        values[f"{name}.lag"] = metrics.phase_lag or 0.0
+        values[f"{name}.loop"] = metrics.widest_loop or 0.0
+    return values
 
 
 def observe(
@@ -92,18 +92,18 @@ def observe(
     From the samples of the controller, as in the paper; with `true`, from the true displacement
     at the same instants.
     """
-    found = observe_compensation(twelve, true=true)
+    values = observe_compensation(twelve, true=true)
     for name, run in thirteen.items():
-        found[f"windup.{name}"] = run.score(true=true).max_error
-    found["repetitive.without"] = fourteen["without"].score(true=true).max_error
+        values[f"windup.{name}"] = run.score(true=true).max_error
+    values["repetitive.without"] = fourteen["without"].score(true=true).max_error
     learning = fourteen["with"]
     period = learning.reference.period or math.inf
     learnt = LEARNT * period
-    found["repetitive.with"] = learning.score(learnt, true=true).max_error
+    values["repetitive.with"] = learning.score(learnt, true=true).max_error
     parts = {"second": period, "fourth": learnt, "last": learning.reference.duration - period}
     for name, start in parts.items():
         part = learning.score(start, start + period, true=true)
-        found[f"repetitive.{name}"] = part.max_error
+        values[f"repetitive.{name}"] = part.max_error
     for name, run in fourteen.items():
-        found[f"repetitive.rms_{name}"] = run.score(parts["last"], true=true).rms_error
-    return found
+        values[f"repetitive.rms_{name}"] = run.score(parts["last"], true=true).rms_error
+    return values

@@ -36,19 +36,19 @@ def observe(table: Table2, stage: XYStage, *, true: bool = False) -> dict[str, f
     too. The errors of an axis are those of its controller, which samples y later than x; where it
     misses ticks, their true values are not known from the record.
     """
-    found = {}
+    values = {}
     for case, run in table.cases:
         key, metrics = case.key, run.score(true=true)
-        found[f"{key}.max"] = metrics.peak_to_peak
-        found[f"{key}.mean"] = metrics.mean_error
-        found[f"{key}.sd"] = metrics.sd_error
-        found[f"{key}.ratio"] = metrics.peak_to_peak / metrics.sd_error
+        values[f"{key}.max"] = metrics.peak_to_peak
+        values[f"{key}.mean"] = metrics.mean_error
+        values[f"{key}.sd"] = metrics.sd_error
+        values[f"{key}.ratio"] = metrics.peak_to_peak / metrics.sd_error
     small, lag = table.runs[0], stage.lag
     if not true or stage.missed_ticks == 0.0:
-        found["circle.axes"] = max(
+        values["circle.axes"] = max(
             _largest(small.x, small.settled, 0.0, true), _largest(small.y, small.settled, lag, true)
         )
-    return found
+    return values
 
 
 def _largest(axis: Tracking, settled: float, lag: float, true: bool) -> float:

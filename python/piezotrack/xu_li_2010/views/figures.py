@@ -172,12 +172,12 @@ def _drives(drives: Drives) -> Figure:
     return whole(figure)
 
 
-def plot_reproduction(found: Reproduction, fig: Figure | SubFigure | None = None) -> Figure:
+def plot_reproduction(reproduction: Reproduction, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw obtained over published of every number, with quartiles, in the order of the paper.
 
     Parameters
     ----------
-    found : Reproduction
+    reproduction : Reproduction
         The numbers.
     fig : matplotlib.figure.Figure or SubFigure, optional
         Where to draw; a new figure where not given.
@@ -187,7 +187,7 @@ def plot_reproduction(found: Reproduction, fig: Figure | SubFigure | None = None
     matplotlib.figure.Figure
         The figure drawn in.
     """
-    rows = found.obtained
+    rows = reproduction.obtained
     figure = sheet(fig, (11.0, 5.0))
     ax = figure.subplots()
     ratios = np.array([row.ratio for row in rows])
@@ -206,6 +206,6 @@ def plot_reproduction(found: Reproduction, fig: Figure | SubFigure | None = None
     ax.set_xticks(first, [figures[i] for i in first], rotation=90, fontsize="small")
     ax.set(xlabel="figure or table of the paper", ylabel="obtained / published")
     ax.margins(x=0.01)
-    heading(ax, f"Median and quartiles of {len(found.seeds)} seeds")
+    heading(ax, f"Median and quartiles of {len(reproduction.seeds)} seeds")
     legend_inside(ax)
     return whole(figure)

@@ -26,32 +26,32 @@ __all__ = ["pages", "save_report"]
 LINES, TYPE = 66, 7.0
 
 
-def save_report(found: Reproduction, folder: str | os.PathLike[str]) -> list[Path]:
+def save_report(reproduction: Reproduction, folder: str | os.PathLike[str]) -> list[Path]:
     """Write the three files; arguments, result and errors as of `Reproduction.save`."""
     import matplotlib.pyplot as plt
 
-    figures = drawn(found.experiments, found.drives)
+    figures = drawn(reproduction.experiments, reproduction.drives)
     try:
         with result_set(make_folder(folder)) as path, without_glyph_warnings():
-            page = html_text(found, figures)
+            page = html_text(reproduction, figures)
             written = [path / name for name in REPORT]
             with replacing(written[0]) as temporary:
                 temporary.write_text(page, encoding="utf-8")
             with replacing(written[1]) as temporary:
-                _write_pdf(found, figures, temporary)
-            write_document(written[2], found.document())
+                _write_pdf(reproduction, figures, temporary)
+            write_document(written[2], reproduction.document())
             return written
     finally:
         for one in figures:
             plt.close(one.figure)
 
 
-def _write_pdf(found: Reproduction, figures: Sequence[Drawn], file: Path) -> None:
+def _write_pdf(reproduction: Reproduction, figures: Sequence[Drawn], file: Path) -> None:
     import matplotlib.pyplot as plt
     from matplotlib.backends.backend_pdf import PdfPages
 
     lines = ["Xu and Li 2010, doi 10.1115/1.4001712, published beside obtained", ""]
-    lines += summary_text(found).splitlines()
+    lines += summary_text(reproduction).splitlines()
     # Without a date the same result gives the same file.
     with PdfPages(file, metadata={"CreationDate": None}) as pdf:
         for part in pages(lines):
@@ -59,10 +59,12 @@ def _write_pdf(found: Reproduction, figures: Sequence[Drawn], file: Path) -> Non
             page.text(0.04, 0.96, "\n".join(part), family="monospace", fontsize=TYPE, va="top")
             pdf.savefig(page)
             plt.close(page)
-        for one in figures:
-            words = f"{one.title}\n{one.caption}"
-            one.figure.text(0.01, 1.02, "\n".join(fill(line, 150) for line in words.splitlines()))
-            pdf.savefig(one.figure, bbox_inches="tight", pad_inches=0.3)
+        for drawing in figures:
+            words = f"{drawing.title}\n{drawing.caption}"
+            drawing.figure.text(
+                0.01, 1.02, "\n".join(fill(line, 150) for line in words.splitlines())
+            )
+            pdf.savefig(drawing.figure, bbox_inches="tight", pad_inches=0.3)
 
 
 def pages(lines: Sequence[str]) -> list[list[str]]:

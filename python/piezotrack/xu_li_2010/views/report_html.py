@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 __all__ = ["html_text", "svg_text"]
 
 
-def html_text(found: Reproduction, figures: Sequence[Drawn]) -> str:
+def html_text(reproduction: Reproduction, figures: Sequence[Drawn]) -> str:
     """Write the page.
 
     Parameters
     ----------
-    found : Reproduction
+    reproduction : Reproduction
         The numbers.
     figures : sequence of Drawn
         The pictures, in their order.
@@ -46,14 +46,14 @@ def html_text(found: Reproduction, figures: Sequence[Drawn]) -> str:
         "no measured data of the paper's stage is public. The controllers see readings at 50 Hz "
         "with noise and quantisation, and errors are computed from these, as in the paper; the "
         "true errors are listed too.</p>",
-        *_numbers(found),
-        *_conclusions(found),
+        *_numbers(reproduction),
+        *_conclusions(reproduction),
         "<h2>Figures</h2>",
-        f"<p>Of the first seed, {found.seeds[0]}. Zoom with the buttons, a double click or "
+        f"<p>Of the first seed, {reproduction.seeds[0]}. Zoom with the buttons, a double click or "
         "Ctrl and the wheel; then drag to move.</p>",
         *(_figure(one) for one in figures),
-        *_beyond(found),
-        *_stage(found),
+        *_beyond(reproduction),
+        *_stage(reproduction),
     ]
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -63,22 +63,22 @@ def html_text(found: Reproduction, figures: Sequence[Drawn]) -> str:
     )
 
 
-def _numbers(found: Reproduction) -> list[str]:
+def _numbers(reproduction: Reproduction) -> list[str]:
     rows = []
-    for one in found.obtained:
-        known, true = one.observable, found.true_median(one.observable.key)
-        low, high = one.quartiles
+    for row in reproduction.obtained:
+        known, true = row.observable, reproduction.true_median(row.observable.key)
+        low, high = row.quartiles
         unit = f", {known.unit}" if known.unit else ""
         cells = [
             f'<span title="{escape(known.how)}">{escape(known.name + unit)}</span>',
-            reading(one),
-            f"<b>{number(one, one.median)}</b>",
-            f"{one.ratio:.2f}",
-            "yes" if one.reached else "<b>no</b>",
+            reading(row),
+            f"<b>{number(row, row.median)}</b>",
+            f"{row.ratio:.2f}",
+            "yes" if row.reached else "<b>no</b>",
             known.label,
-            f"{number(one, low)} to {number(one, high)}",
-            "" if true is None else number(one, true),
-            escape(place(one)),
+            f"{number(row, low)} to {number(row, high)}",
+            "" if true is None else number(row, true),
+            escape(place(row)),
         ]
         rows.append(cells)
     heads = (
@@ -94,20 +94,20 @@ def _numbers(found: Reproduction) -> list[str]:
     )
     return [
         "<h2>Numbers</h2>",
-        *(f"<p>{escape(line)}</p>" for line in tally(found)),
+        *(f"<p>{escape(line)}</p>" for line in tally(reproduction)),
         f'<div class="numbers">{table(heads, rows)}</div>',
     ]
 
 
-def _conclusions(found: Reproduction) -> list[str]:
+def _conclusions(reproduction: Reproduction) -> list[str]:
     rows = [
         [
-            escape(one.text),
-            f"<b>{seen(one.holds)}</b>",
-            f"{one.seen} of {one.seeds}",
-            escape(one.words),
+            escape(conclusion.text),
+            f"<b>{seen(conclusion.holds)}</b>",
+            f"{conclusion.seen} of {conclusion.seeds}",
+            escape(conclusion.words),
         ]
-        for one in found.conclusions
+        for conclusion in reproduction.conclusions
     ]
     return [
         "<h2>Conclusions</h2>",
@@ -117,12 +117,12 @@ def _conclusions(found: Reproduction) -> list[str]:
 
 def _beyond(found: Reproduction) -> list[str]:
     parts = ["<h2>Beyond the paper</h2>", "<p>On the same stage, with one seed of the sensors.</p>"]
-    for one in found.sections:
-        rows = [[escape(cell) for cell in row] for row in one.rows]
+    for section in found.sections:
+        rows = [[escape(cell) for cell in row] for row in section.rows]
         parts += [
-            f"<h3>{escape(one.title)}</h3>",
-            f"<p>{escape(one.text)}</p>",
-            table(map(escape, one.heads), rows),
+            f"<h3>{escape(section.title)}</h3>",
+            f"<p>{escape(section.text)}</p>",
+            table(map(escape, section.heads), rows),
         ]
     return parts
 
@@ -154,14 +154,16 @@ def _calibration() -> list[str]:
     named = {one.key: one.name for one in observables()}
     rows = [
         [
-            escape(one["meaning"]),
-            _short(one["value"]) + (", on a bound" if _on_a_bound(one) else ""),
-            f"{_short(one['bounds'][0])} to {_short(one['bounds'][1])}",
+            escape(parameter["meaning"]),
+            _short(parameter["value"]) + (", on a bound" if _on_a_bound(parameter) else ""),
+            f"{_short(parameter['bounds'][0])} to {_short(parameter['bounds'][1])}",
             escape(
-                "; ".join(f"{named[key]} {change:+.1f}" for key, change in one["moves"].items())
+                "; ".join(
+                    f"{named[key]} {change:+.1f}" for key, change in parameter["moves"].items()
+                )
             ),
         ]
-        for one in calibration_file()["free"]
+        for parameter in calibration_file()["free"]
     ]
     return [
         "<h3>Free parameters against observables</h3>",
@@ -189,21 +191,21 @@ def table(heads: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
     return f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n{body}</table></div>'
 
 
-def _figure(one: Drawn) -> str:
+def _figure(drawing: Drawn) -> str:
     return (
-        f'<figure id="{one.name}"><h3>{escape(one.title)}</h3>\n'
-        f'<div class="picture">{svg_text(one)}</div>\n'
-        f"<figcaption>{escape(one.caption)}</figcaption></figure>"
+        f'<figure id="{drawing.name}"><h3>{escape(drawing.title)}</h3>\n'
+        f'<div class="picture">{svg_text(drawing)}</div>\n'
+        f"<figcaption>{escape(drawing.caption)}</figcaption></figure>"
     )
 
 
-def svg_text(one: Drawn) -> str:
+def svg_text(drawing: Drawn) -> str:
     """Write a picture as an SVG element, reproducibly."""
     import matplotlib as mpl
 
     buffer = io.StringIO()
     # All pictures are on one page, so their ids have to differ.
-    with mpl.rc_context({"svg.hashsalt": one.name}):
-        one.figure.savefig(buffer, format="svg", metadata={"Date": None})
+    with mpl.rc_context({"svg.hashsalt": drawing.name}):
+        drawing.figure.savefig(buffer, format="svg", metadata={"Date": None})
     text = buffer.getvalue()
     return text[text.index("<svg") :]

@@ -26,25 +26,25 @@ WIDTH = 118
 SIGNS = {"value": "", "about": "about ", "bound": "within "}
 
 
-def summary_text(found: Reproduction) -> str:
+def summary_text(reproduction: Reproduction) -> str:
     """Write table and conclusions, as of `Reproduction.summary`."""
     lines = [
         f"{'figure':<9}{'':<50}{'published':>14}  {'obtained':>9}  {'quartiles':<17}"
         f"{'true':>8}  {'ratio':>5}"
     ]
-    for one in found.obtained:
-        low, high = (number(one, value) for value in one.quartiles)
-        true = found.true_median(one.observable.key)
-        mark = " " if one.reached else "*"
-        use = "" if one.observable.use == "calibrated" else one.observable.label
+    for row in reproduction.obtained:
+        low, high = (number(row, value) for value in row.quartiles)
+        true = reproduction.true_median(row.observable.key)
+        mark = " " if row.reached else "*"
+        use = "" if row.observable.use == "calibrated" else row.observable.label
         lines.append(
-            f"{one.observable.figure:<9}{_name(one):<50}{reading(one):>14}  "
-            f"{number(one, one.median):>8}{mark}  {low + ' to ' + high:<17}"
-            f"{'' if true is None else number(one, true):>8}  {one.ratio:>5.2f}  {use}".rstrip()
+            f"{row.observable.figure:<9}{_name(row):<50}{reading(row):>14}  "
+            f"{number(row, row.median):>8}{mark}  {low + ' to ' + high:<17}"
+            f"{'' if true is None else number(row, true):>8}  {row.ratio:>5.2f}  {use}".rstrip()
         )
-    lines += ["", *(line for part in tally(found) for line in wrap(part, WIDTH))]
+    lines += ["", *(line for part in tally(reproduction) for line in wrap(part, WIDTH))]
     lines += ["* marks numbers that are not reached.", "", "Conclusions of the paper"]
-    for conclusion in found.conclusions:
+    for conclusion in reproduction.conclusions:
         lines += [
             f"  {'confirmed    ' if conclusion.holds else 'NOT CONFIRMED'}  {conclusion.text}",
             *(
@@ -54,7 +54,7 @@ def summary_text(found: Reproduction) -> str:
                 )
             ),
         ]
-    for part in found.sections:
+    for part in reproduction.sections:
         lines += ["", part.title, *wrap(part.text, WIDTH), *_columns(part)]
     return "\n".join(lines)
 
@@ -67,14 +67,14 @@ def table_2_text(table: Table2) -> str:
         "             max / SD",
     ]
     for case, run in table.cases:
-        found = run.metrics
+        metrics = run.metrics
         pairs = (
-            (case.peak_to_peak, found.peak_to_peak),
-            (case.mean, found.mean_error),
-            (case.sd, found.sd_error),
+            (case.peak_to_peak, metrics.peak_to_peak),
+            (case.mean, metrics.mean_error),
+            (case.sd, metrics.sd_error),
         )
         cells = "  ".join(f"{1e6 * one:>7.3f} /{1e6 * other:>7.3f}" for one, other in pairs)
-        ratio = f"{case.ratio:>6.1f} /{found.peak_to_peak / found.sd_error:>5.1f}"
+        ratio = f"{case.ratio:>6.1f} /{metrics.peak_to_peak / metrics.sd_error:>5.1f}"
         lines.append(f"{1e6 * case.radius:>9g}  {case.frequency:>12g}  {cells}  {ratio}")
     return "\n".join(lines)
 
@@ -85,9 +85,9 @@ def _columns(part: Section) -> list[str]:
     return Table([Column(first, left=True), *map(Column, others)], part.rows).lines()
 
 
-def tally(found: Reproduction) -> list[str]:
+def tally(reproduction: Reproduction) -> list[str]:
     """Count the numbers within their tolerances, by their use; a string for each paragraph."""
-    rows = found.obtained
+    rows = reproduction.obtained
     fitted = [one for one in rows if one.observable.calibrated]
     given = [one for one in fitted if one.observable.use == "put in"]
     left_out = [one for one in rows if one.observable.use == "left out"]
@@ -96,7 +96,7 @@ def tally(found: Reproduction) -> list[str]:
     missed = [one for one in others if not one.reached]
     return [
         f"{_reached(fitted)} calibrated numbers within 15 % or 0.04 um, medians over "
-        f"{len(found.seeds)} seeds; {len(given)} of them were put in: {_listed(given)}.",
+        f"{len(reproduction.seeds)} seeds; {len(given)} of them were put in: {_listed(given)}.",
         f"{_reached(left_out)} numbers left out of the calibration within 30 % or 0.08 um: "
         f"{_reached(circles)} of circles, which scale from the calibrated ones, and "
         f"{_reached(others)} others. Not reached of these: {_listed(missed)}.",
@@ -131,10 +131,10 @@ def place(one: Obtained) -> str:
     return figure if figure.startswith("Table") else f"Fig. {figure}"
 
 
-def number(one: Obtained, value: float) -> str:
+def number(row: Obtained, value: float) -> str:
     """Write the number of a value in the unit of its observable."""
-    shown = value / SI[one.observable.unit]
-    if one.observable.unit in ("rad", ""):
+    shown = value / SI[row.observable.unit]
+    if row.observable.unit in ("rad", ""):
         return f"{shown:.4f}"
     digits = 0 if abs(shown) >= 1000.0 else 1 if abs(shown) >= 100.0 else 3
     return f"{shown:.{digits}f}"

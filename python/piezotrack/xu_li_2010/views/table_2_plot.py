@@ -87,11 +87,11 @@ def _bars(table: Table2, name: str, ax: Axes) -> None:
     cases = [case for case, _ in table.cases]
     places = np.arange(len(cases))
     published = [1e6 * case[column] for case in cases]
-    found = [1e6 * getattr(run.metrics, attribute) for run in table.runs]
+    obtained = [1e6 * getattr(run.metrics, attribute) for run in table.runs]
     ax.bar(
         places - 0.2, published, 0.4, color=MEASURED["color"], edgecolor="0.3", label="published"
     )
-    ax.bar(places + 0.2, found, 0.4, color=ACTUAL["color"], edgecolor="0.1", label="obtained")
+    ax.bar(places + 0.2, obtained, 0.4, color=ACTUAL["color"], edgecolor="0.1", label="obtained")
     what = "peak to peak" if name == "max" else name
     ax.set(ylabel=f"{what} [um]", xlabel="radius [um], and frequency [Hz]")
     labels = [f"{1e6 * case.radius:g}\n{case.frequency:g}" for case in cases]

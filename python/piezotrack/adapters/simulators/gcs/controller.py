@@ -368,14 +368,14 @@ class VirtualController:
         self._axis.record(self._record_rate, POINTS // TABLES, start)
 
     def _set_table(self, words: Sequence[str]) -> None:
-        found = {}
+        sources = {}
         for table, source, option in pairs_of(words, 3):
             if whole_of(option) not in OPTIONS:
                 raise Refusal(58)
             if source != AXIS:
                 raise Refusal(59)
-            found[numbered(table, TABLES, 57)] = (source, whole_of(option))
-        self._tables.update(found)
+            sources[numbered(table, TABLES, 57)] = (source, whole_of(option))
+        self._tables.update(sources)
 
     def _set_trigger(self, words: Sequence[str]) -> None:
         for table, trigger, _ in pairs_of(words, 3):

@@ -76,7 +76,7 @@ def read_variables(source: Source) -> list[Variable]:
     """
     data = memoryview(source.content())
     order = "<" if bytes(data[126:128]) == b"IM" else ">"
-    found, place, total = [], HEADER, 0
+    variables, place, total = [], HEADER, 0
     while place < len(data):
         if place + 8 > len(data):
             _unsound(source, "it ends within a tag")
@@ -90,9 +90,9 @@ def read_variables(source: Source) -> list[Variable]:
             count += -count % 8
         else:
             _unsound(source, f"the element at byte {place} is of type {kind}")
-        found.append(_Array(source, order, DEEPEST).read(body))
+        variables.append(_Array(source, order, DEEPEST).read(body))
         place += 8 + count
-    return found
+    return variables
 
 
 def _unsound(source: Source, fault: str) -> NoReturn:

@@ -146,15 +146,15 @@ def _read(source: Source, asammdf: Any, group: int, wanted: int | None) -> dict[
     with _opened(source, asammdf) as file:
         sound = _disarm(file)
         master = file.masters_db.get(group)
-        found = {}
+        samples_of = {}
         for index in sound[group] if wanted is None else [wanted]:
             # Copied, as the file is closed.
             if index == master:
-                found[index] = file.get(group=group, index=index).timestamps.copy()
+                samples_of[index] = file.get(group=group, index=index).timestamps.copy()
             else:
                 samples, _ = file.get(group=group, index=index, samples_only=True)
-                found[index] = samples.copy()
-        return found
+                samples_of[index] = samples.copy()
+        return samples_of
 
 
 def _disarm(file: Any) -> list[list[int]]:

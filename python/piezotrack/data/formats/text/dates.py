@@ -56,18 +56,18 @@ def instant_of(text: str) -> Instant | None:
     if ":" not in plain and "-" not in plain and "." not in plain:
         return None
     try:
-        if found := _GERMAN.fullmatch(plain):
-            day, month, year, hour, minute, second, fraction = found.groups()
+        if match := _GERMAN.fullmatch(plain):
+            day, month, year, hour, minute, second, fraction = match.groups()
             date = datetime(int(year), int(month), int(day), int(hour or 0), int(minute or 0))
             return Instant(date + timedelta(seconds=_sixty(second)), _nanoseconds(fraction))
-        if found := _CLOCK.fullmatch(plain):
-            hour, minute, second, fraction = found.groups()
+        if match := _CLOCK.fullmatch(plain):
+            hour, minute, second, fraction = match.groups()
             date = datetime(2000, 1, 1, int(hour), int(minute))
             return Instant(date + timedelta(seconds=_sixty(second)), _nanoseconds(fraction))
-        if found := _YEAR_FIRST.fullmatch(plain):
-            plain = "{}-{}-{}{}".format(*found.groups())
-        found = _FRACTION.search(plain)
-        nanoseconds = _nanoseconds(found[2]) if found else 0
+        if match := _YEAR_FIRST.fullmatch(plain):
+            plain = "{}-{}-{}{}".format(*match.groups())
+        match = _FRACTION.search(plain)
+        nanoseconds = _nanoseconds(match[2]) if match else 0
         date = datetime.fromisoformat(_FRACTION.sub(r"\1", plain))
     except (ValueError, OverflowError):
         return None

@@ -92,10 +92,10 @@ def _decode(source: Source, data: bytes) -> str:
         text = data.decode("latin-1")
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
-    if found := _CONTROL.search(text):
-        line = text.count("\n", 0, found.start()) + 1
+    if match := _CONTROL.search(text):
+        line = text.count("\n", 0, match.start()) + 1
         raise source.error(
-            f"is not a text log: it holds the byte {ord(found[0])}, expected text", line
+            f"is not a text log: it holds the byte {ord(match[0])}, expected text", line
         )
     return text
 
@@ -132,7 +132,7 @@ class Layout:
         self.header = header
 
     @classmethod
-    def found(cls, source: Source, lines: list[str]) -> Layout:
+    def of(cls, source: Source, lines: list[str]) -> Layout:
         """Find header and delimiter of a log that has no other description."""
         header = _first_line(source, lines)
         delimiter = delimiter_of(lines[header])
@@ -359,7 +359,7 @@ def _seconds(text: str, first: Instant) -> float:
 
 
 def _opens(source: Source) -> TextTable:
-    return TextTable(source, Layout.found(source, lines_of(source)))
+    return TextTable(source, Layout.of(source, lines_of(source)))
 
 
 def _writes(path: Path, columns: Sequence[WrittenColumn]) -> None:

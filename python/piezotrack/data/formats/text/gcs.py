@@ -46,11 +46,11 @@ def _opens(source: Source) -> TextTable:
     )
     table = TextTable(source, layout, dt=_sample_time(source, entries))
     if "NDATA" in entries:
-        said, there = _whole(source, entries, "NDATA", 0, 2**63), table.count(columns[0])
-        if said != there:
-            cut = "; the log may have been cut off" if there < said else ""
+        stated, there = _whole(source, entries, "NDATA", 0, 2**63), table.count(columns[0])
+        if stated != there:
+            cut = "; the log may have been cut off" if there < stated else ""
             raise source.error(
-                f"says NDATA = {said} and has {there} samples: expected equally many{cut}",
+                f"says NDATA = {stated} and has {there} samples: expected equally many{cut}",
                 entries["NDATA"][0],
             )
     return table
@@ -69,12 +69,12 @@ def _columns(
     there = sum(1 for field in fields if field)
     if "DIM" not in entries:
         return there
-    said = _whole(source, entries, "DIM", 1, MOST_COLUMNS)
-    if first and said != there:
+    stated = _whole(source, entries, "DIM", 1, MOST_COLUMNS)
+    if first and stated != there:
         raise source.error(
-            f"says DIM = {said} and has {there} columns: expected equally many", entries["DIM"][0]
+            f"says DIM = {stated} and has {there} columns: expected equally many", entries["DIM"][0]
         )
-    return said
+    return stated
 
 
 def _whole(

@@ -68,12 +68,12 @@ def _without_special(lines: list[str]) -> list[str]:
 
 def _entries(lines: list[str], separator: str | None) -> dict[str, list[str]]:
     """Read the lines of a header: a name, then values."""
-    found = {}
+    entries = {}
     for line in lines:
         name, *values = [field.strip() for field in line.split(separator or _separator(line))]
         if name:
-            found[name] = values or [""]
-    return found
+            entries[name] = values or [""]
+    return entries
 
 
 def _separator(line: str) -> str:

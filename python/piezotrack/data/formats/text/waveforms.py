@@ -24,16 +24,16 @@ def _opens(source: Source) -> TextTable:
     for number, line in enumerate(lines):
         if line.strip() and not line.startswith("#"):
             break
-        if found := _SAMPLES.fullmatch(line):
-            stated = int(found[1]), number + 1
-        if found := _RATE.fullmatch(line):
+        if match := _SAMPLES.fullmatch(line):
+            stated = int(match[1]), number + 1
+        if match := _RATE.fullmatch(line):
             try:
-                dt = 1.0 / (float(found[1]) * FACTORS[found[2].lower()])
+                dt = 1.0 / (float(match[1]) * FACTORS[match[2].lower()])
             except (ValueError, ZeroDivisionError):
                 raise source.error(
-                    f"the sample rate is {found[1][:40]!r}: expected hertz above 0", number + 1
+                    f"the sample rate is {match[1][:40]!r}: expected hertz above 0", number + 1
                 ) from None
-    table = TextTable(source, Layout.found(source, lines), dt=dt)
+    table = TextTable(source, Layout.of(source, lines), dt=dt)
     if stated is not None and (there := table.count(table.columns[0])) < stated[0]:
         raise source.error(
             f"says {stated[0]} samples and has {there}: expected equally many; the log may have "
