@@ -84,6 +84,30 @@ def test_a_search_goes_on_to_the_same_bits(settings: dict[str, Any], tmp_path: P
     assert path.read_bytes() == content
 
 
+def test_descents_after_a_swarm_go_on_too(tmp_path: Path) -> None:
+    stage = pt.FirstOrderDahlStage(
+        mass=0.16,
+        damping=500.0,
+        stiffness=1e6,
+        piezo_coefficient=1.8,
+        rest_stiffness=2.5e5,
+        coulomb_force=8.0,
+    )
+    u = 40.0 + 35.0 * np.sin(2 * np.pi * DT * np.arange(2000))
+    x = stage.simulate(u, DT, initial=stage.equilibrium([75.0, u[0]])).x
+    log, path = pt.Dataset(u=u, y=x, dt=DT), tmp_path / "search.checkpoint"
+    swarm = pt.ParticleSwarm(iterations=10, runs=1)
+    settings: dict[str, Any] = {"model": "first-order-dahl", "method": swarm}
+    seen: list[pt.identification.Progress] = []
+    fit = pt.identify(log, callback=seen.append, **settings)
+    assert fit.start is not None
+    assert fit.start.history == "fit"
+    # Within the descents.
+    assert len(seen) > swarm.iterations + 5
+    assert interrupted(path, swarm.iterations + 4, log, **settings)
+    assert found(pt.identify(log, checkpoint=path, **settings)) == found(fit)
+
+
 @pytest.mark.slow
 def test_fifty_interruptions_change_nothing(tmp_path: Path) -> None:
     settings: dict[str, Any] = {"model": "dahl", "method": pt.ParticleSwarm(runs=2)}

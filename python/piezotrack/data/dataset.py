@@ -327,7 +327,18 @@ class Dataset(Viewed):
         return None if self._inserted is None else self._inserted[self._start :]
 
     def at_readings(self, values: Array) -> Array:
-        """Return the entries of values in the window without those at `inserted` samples."""
+        """Return the entries of values in the window without those at `inserted` samples.
+
+        Parameters
+        ----------
+        values : ndarray, shape (n,)
+            One for each sample.
+
+        Returns
+        -------
+        ndarray
+            `values` where none was inserted.
+        """
         return values if self.inserted is None else values[~self.inserted]
 
     @property
