@@ -274,7 +274,7 @@ def test_plants_of_both_signs_are_refused() -> None:
     ("name", "value"), [("gain", 1.0), ("phase", 30.0), ("sensitivity", 0.5), ("learning", 2.0)]
 )
 def test_impossible_margins_are_named(name: str, value: float) -> None:
-    with pytest.raises(pt.ParameterError, match=f"{name} is {value}"):
+    with pytest.raises(pt.ParameterError, match=f"{name} is {value:g}"):
         pt.Margins(**{name: value})
 
 

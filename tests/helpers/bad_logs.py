@@ -213,10 +213,10 @@ def _of_bytes(kind: Kind) -> list[Case]:
 
 def _changed(kind: str, change: Callable[[bytes], bytes]) -> Make:
     """A sound file with some of its bytes changed."""
-    (one,) = [kind_of_log for kind_of_log in KINDS if kind_of_log.name == kind]
+    (described,) = [kind_of_log for kind_of_log in KINDS if kind_of_log.name == kind]
 
     def make(path: Path) -> None:
-        _sound(one, path)
+        _sound(described, path)
         content = path.read_bytes()
         changed = change(content)
         assert changed != content
