@@ -85,16 +85,16 @@ def test_plays_beyond_half_of_the_range_move_once() -> None:
 def test_a_record_is_searched_again_only_for_a_history_that_it_shows(
     visited: list[float], searched: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = []
+    settings = []
 
     def search(problem: Any, *arguments: Any) -> Any:
-        asked.append(problem.records[0].history)
+        settings.append(problem.records[0].history)
         return search_parameters(problem, *arguments)
 
     monkeypatch.setattr("piezotrack.identification.solve.one_model.search_parameters", search)
     pt.identify(record(visited), "first-order-dahl")
-    assert set(asked) <= set(searched)
-    assert asked[-1] == searched[-1]
+    assert set(settings) <= set(searched)
+    assert settings[-1] == searched[-1]
 
 
 @pytest.mark.parametrize("swarm", [pt.ParticleSwarm.xu_li_2010(), QUICK], ids=["paper", "ring"])
