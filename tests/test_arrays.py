@@ -315,21 +315,21 @@ ROOMS = (pt, pt.control, pt.data, pt.identification, pt.references, pt.stages, p
 
 def takers() -> set[str]:
     """Names of the public functions and methods with an argument that is like an array."""
-    found = set()
+    functions = set()
     public = [(name, getattr(room, name)) for room in ROOMS for name in room.__all__]
-    for name, one in public:
-        if inspect.isclass(one) and not issubclass(one, Exception):
-            methods = {f"{name}.{key}": value for key, value in vars(one).items()}
-            inside = {name: one, **methods}
+    for name, public_value in public:
+        if inspect.isclass(public_value) and not issubclass(public_value, Exception):
+            methods = {f"{name}.{key}": value for key, value in vars(public_value).items()}
+            inside = {name: public_value, **methods}
         else:
-            inside = {name: one}
+            inside = {name: public_value}
         for called, value in inside.items():
             function = getattr(value, "__func__", value)
             if callable(function) and not called.rpartition(".")[2].startswith("_"):
                 with contextlib.suppress(TypeError, ValueError):
                     if "ArrayLike" in str(inspect.signature(function)):
-                        found.add(called)
-    return found
+                        functions.add(called)
+    return functions
 
 
 def test_every_public_function_of_an_array_is_in_the_table() -> None:

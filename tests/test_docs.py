@@ -89,15 +89,15 @@ CLASSES = {name: value for name, value in PUBLIC.items() if inspect.isclass(valu
 
 def members() -> dict[str, Any]:
     """The public functions, classes and methods, by the names they are used with."""
-    found = dict(PUBLIC)
+    all_members = dict(PUBLIC)
     for owner, value in CLASSES.items():
         for name, member in inspect.getmembers(value):
             module = getattr(
                 inspect.unwrap(getattr(member, "fget", None) or member), "__module__", ""
             )
             if not name.startswith("_") and str(module).startswith("piezotrack"):
-                found[f"{owner}.{name}"] = member
-    return found
+                all_members[f"{owner}.{name}"] = member
+    return all_members
 
 
 MEMBERS = members()

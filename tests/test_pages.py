@@ -61,18 +61,18 @@ FITS: dict[str, Any] = {}
 def fitted_once(data: Any, *arguments: Any, **options: Any) -> Any:
     """Identify, but the same record once only: README and pages fit the same one."""
     # The command line says what the default is.
-    said = {key: value for key, value in options.items() if value is not None}
+    chosen = {key: value for key, value in options.items() if value is not None}
     given = data
     if isinstance(given, pt.Record):
         own = {key: value for key, value in vars(given).items() if value is not None}
-        data, said = own.pop("data"), {**own, **said}
+        data, chosen = own.pop("data"), {**own, **chosen}
     if not isinstance(data, pt.Dataset):
         return identify(given, *arguments, **options)
     for key, usual in (("offset", True), ("weight", 1.0)):
-        if said.get(key) == usual:
-            del said[key]
+        if chosen.get(key) == usual:
+            del chosen[key]
     record = (data.full.sha256, data.t[0], data.t[-1], data.source)
-    key = repr((record, arguments, sorted(said.items())))
+    key = repr((record, arguments, sorted(chosen.items())))
     if key not in FITS or data.full.duration < 30.0:
         FITS[key] = identify(given, *arguments, **options)
     return FITS[key]
@@ -192,9 +192,9 @@ def test_the_pages_name_paths(tmp_path: Path) -> None:
 
 
 def test_every_page_is_reached_from_the_readme() -> None:
-    found = [ROOT / "README.md"]
-    for page in found:
+    reached = [ROOT / "README.md"]
+    for page in reached:
         for target in re.findall(r"\]\(([^)#\s]+\.md)", page.read_text(encoding="utf-8")):
-            if "://" not in target and (there := (page.parent / target).resolve()) not in found:
-                found.append(there)
-    assert set(PAGES) <= set(found)
+            if "://" not in target and (there := (page.parent / target).resolve()) not in reached:
+                reached.append(there)
+    assert set(PAGES) <= set(reached)

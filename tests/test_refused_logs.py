@@ -55,12 +55,12 @@ def test_every_format_that_is_read_has_a_table() -> None:
         assert not known.endings or any(one.endswith(known.endings) for one in files), known.name
 
 
-@pytest.mark.parametrize(("wrong", "said"), ROWS)
-def test_a_sentence_names_the_file_and_what_was_expected(wrong: str, said: str) -> None:
-    file, colon, rest = said.partition(": ")
+@pytest.mark.parametrize(("wrong", "message"), ROWS)
+def test_a_sentence_names_the_file_and_what_was_expected(wrong: str, message: str) -> None:
+    file, colon, rest = message.partition(": ")
     assert colon, wrong
     assert re.fullmatch(r"[\w.-]+(:\d+)?", file)
-    assert any(remedy in rest for remedy in REMEDIES), said
+    assert any(remedy in rest for remedy in REMEDIES), message
     # No folder of the machine that the page was made on.
-    assert tempfile.gettempdir() not in said
-    assert str(ROOT) not in said
+    assert tempfile.gettempdir() not in message
+    assert str(ROOT) not in message

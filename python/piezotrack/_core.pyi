@@ -77,6 +77,7 @@ def identify(
     method: SwarmSettings | DescentSettings,
     seed: int,
     runs: int,
+    start: Sequence[float] | None,
     threads: int,
     callback: Callable[[int, int, int, float, list[float], float], bool] | None,
     progress: Callable[[int, int, int, float, list[float], float], None] | None,

@@ -15,10 +15,10 @@ def classes() -> list[type[Viewed]]:
     for module in pkgutil.walk_packages(pt.__path__, "piezotrack."):
         if not module.name.endswith("__main__"):
             import_module(module.name)
-    found: set[type[Viewed]] = {Viewed}
-    while more := {below for one in found for below in one.__subclasses__()} - found:
-        found |= more
-    return sorted(found - {Viewed, Result}, key=lambda one: one.__name__)
+    known: set[type[Viewed]] = {Viewed}
+    while more := {below for one in known for below in one.__subclasses__()} - known:
+        known |= more
+    return sorted(known - {Viewed, Result}, key=lambda one: one.__name__)
 
 
 def test_every_view_of_every_result_is_there() -> None:

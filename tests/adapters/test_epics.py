@@ -153,21 +153,21 @@ def ask(program: str, surroundings: dict[str, str]) -> Any:
 
 @pytest.mark.slow
 def test_prepare_kickoff_complete_are_a_play(surroundings: dict[str, str]) -> None:
-    found = ask(CLIENT.format(body=PLAY), surroundings)
+    answer = ask(CLIENT.format(body=PLAY), surroundings)
     volts = 30.0 - 30.0 * np.cos(np.arange(400) / 60.0)
     alone = pt.hardware.connect("virtual:").play(volts, 500.0)
-    np.testing.assert_array_equal(found["table"], volts)
+    np.testing.assert_array_equal(answer["table"], volts)
     # What differs is the sensor's noise: the server has read the stage at rest before.
-    np.testing.assert_allclose(found["record"], 1e6 * alone.displacement, atol=1.0)
-    assert np.ptp(found["record"]) > 50.0
-    assert found["held"] == volts[-1]
+    np.testing.assert_allclose(answer["record"], 1e6 * alone.displacement, atol=1.0)
+    assert np.ptp(answer["record"]) > 50.0
+    assert answer["held"] == volts[-1]
 
 
 def test_what_is_refused_is_said_and_puts_nothing_out(surroundings: dict[str, str]) -> None:
-    found = ask(CLIENT.format(body=REFUSED), surroundings)
-    assert found["held"] == 10.0
-    assert "stage: Table is 80 V at sample 0: expected 0 to 75 V" in found["play"]
-    assert "expected kickoff before complete" in found["nothing"]
+    answer = ask(CLIENT.format(body=REFUSED), surroundings)
+    assert answer["held"] == 10.0
+    assert "stage: Table is 80 V at sample 0: expected 0 to 75 V" in answer["play"]
+    assert "expected kickoff before complete" in answer["nothing"]
 
 
 def test_a_voltage_moves_the_position(surroundings: dict[str, str]) -> None:
@@ -247,12 +247,12 @@ def test_a_device_that_fails_is_an_alarm_with_its_first_sentence() -> None:
             assert client.stdout.readline() == "ready\n"
             server.close()
             said, _ = client.communicate("\n", timeout=120)
-    found = json.loads(said.splitlines()[-1])
-    assert found["before"] == {"Voltage": 0, "Position": 0}
-    assert found["after"] == {"Voltage": 3, "Position": 3}
-    assert found["voltage"] == 20.0
-    assert found["first"]
-    assert found["message"] == found["first"]
+    answer = json.loads(said.splitlines()[-1])
+    assert answer["before"] == {"Voltage": 0, "Position": 0}
+    assert answer["after"] == {"Voltage": 3, "Position": 3}
+    assert answer["voltage"] == 20.0
+    assert answer["first"]
+    assert answer["message"] == answer["first"]
 
 
 ASKED = """
@@ -351,7 +351,7 @@ def bound_by(process: int) -> set[tuple[str, str, int]]:
     for one in (folder / "fd").iterdir():
         with suppress(OSError):
             links.append(str(one.readlink()))
-    found = set()
+    addresses = set()
     for kind in ("tcp", "udp", "tcp6", "udp6"):
         for line in (folder / "net" / kind).read_text().splitlines()[1:]:
             words = line.split()
@@ -359,8 +359,8 @@ def bound_by(process: int) -> set[tuple[str, str, int]]:
             # Of TCP those that listen.
             if f"socket:[{words[9]}]" in links and (kind[:3] == "udp" or words[3] == "0A"):
                 host = ".".join(str(one) for one in reversed(bytes.fromhex(address)))
-                found.add((kind, host, int(port, 16)))
-    return found
+                addresses.add((kind, host, int(port, 16)))
+    return addresses
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")

@@ -329,10 +329,10 @@ REFUSED = {
 
 @pytest.mark.parametrize("line", REFUSED)
 def test_a_refused_command_has_its_code_and_changes_nothing(bench: Bench, line: str) -> None:
-    asked = ("SVA? 1", "SVO? 1", "WAV?", "WSL?", "WGC?", "WTR?", "DRC?", "DRT?", "RTR?", "WGO?")
-    before = [bench(one) for one in asked]
+    queries = ("SVA? 1", "SVO? 1", "WAV?", "WSL?", "WGC?", "WTR?", "DRC?", "DRT?", "RTR?", "WGO?")
+    before = [bench(one) for one in queries]
     assert bench.refusal(line) == REFUSED[line]
-    assert [bench(one) for one in asked] == before
+    assert [bench(one) for one in queries] == before
 
 
 def test_what_is_not_allowed_with_the_servo_on(bench: Bench) -> None:
@@ -371,11 +371,11 @@ def test_a_wave_beyond_the_limits_does_not_start(bench: Bench) -> None:
 
 def test_every_command_is_in_the_help(bench: Bench) -> None:
     help_text = bench("HLP?")
-    told = {line.split()[0] for line in help_text[1:-1]}
+    listed = {line.split()[0] for line in help_text[1:-1]}
     known = {name for name in (*ACTIONS, *QUERIES) if name.isprintable()}
-    assert told == known | {"ERR?", "#5", "#7", "#9", "#24"}
+    assert listed == known | {"ERR?", "#5", "#7", "#9", "#24"}
     # Every query without arguments is answered, but for those about data that is not there.
-    for name in sorted(told - {"ERR?", "GWD?", "DRR?"}):
+    for name in sorted(listed - {"ERR?", "GWD?", "DRR?"}):
         if name.endswith("?"):
             assert bench(name), name
     assert bench("") == []

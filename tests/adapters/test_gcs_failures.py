@@ -74,11 +74,11 @@ def test_somebody_who_says_nothing() -> None:
 
 
 def test_half_an_answer() -> None:
-    said = refused({"VMI? 1": "1=0.5"}, NEVER)
-    assert "'VMI? 1' is answered by half, '1=0.5'" in said
+    message = refused({"VMI? 1": "1=0.5"}, NEVER)
+    assert "'VMI? 1' is answered by half, '1=0.5'" in message
     # A line that another is to follow, which does not come.
-    said = refused({"HLP?": "begin \nPOS? \n"}, NEVER)
-    assert "'HLP?' is answered by half, 2 lines and ''" in said
+    message = refused({"HLP?": "begin \nPOS? \n"}, NEVER)
+    assert "'HLP?' is answered by half, 2 lines and ''" in message
 
 
 def test_a_connection_that_is_closed() -> None:
@@ -151,10 +151,10 @@ def test_a_controller_that_does_not_say_how_long_a_wave_may_be() -> None:
 
 
 def test_an_error_has_its_code_and_its_words() -> None:
-    said = {"SVA 1 5": "", "ERR?": "66\n"}
+    answers = {"SVA 1 5": "", "ERR?": "66\n"}
     with connected({}) as device:
         pass
-    with peer(greeted(said)) as port:
+    with peer(greeted(answers)) as port:
         device = GcsDevice("127.0.0.1", port, timeout=SOON)
         with pytest.raises(pt.DeviceError, match=r"'SVO 1 0; SVA 1 5' is refused: error 66 "):
             device.hold(5.0)

@@ -48,7 +48,7 @@ pi.close()
 """
 
 
-def asked(body: str, speed: float = 20.0) -> dict[str, Any]:
+def printed_by(body: str, speed: float = 20.0) -> dict[str, Any]:
     """What a script says that uses PIPython."""
     with GcsServer(quiet_stage(), speed=speed) as server:
         done = subprocess.run(
@@ -59,15 +59,15 @@ def asked(body: str, speed: float = 20.0) -> dict[str, Any]:
             check=False,
         )
     assert done.returncode == 0, done.stderr
-    found: dict[str, Any] = json.loads(done.stdout)
+    answer: dict[str, Any] = json.loads(done.stdout)
     # Nothing that it has sent was refused without its noticing.
-    assert found.pop("left") == 0
-    return found
+    assert answer.pop("left") == 0
+    return answer
 
 
 @pytest.mark.slow
 def test_it_takes_the_controller_for_one_of_gcs_2() -> None:
-    found = asked("""
+    answer = printed_by("""
 found["kind"] = type(pi.gcsdevice).__name__
 found["axes"] = pi.axes
 found["name"] = pi.qIDN()
@@ -77,20 +77,20 @@ found["functions"] = pi.funcs
 found["servo"] = pi.qSPA("1", 0x0E000200)["1"][0x0E000200]
 found["points"] = datarectools.Datarecorder(pi).maxnumvalues
 """)
-    assert found["kind"] == "GCS2Device"
-    assert found["axes"] == ["1"]
-    assert found["version"] == 2.0
-    assert found["ready"] is True
-    assert found["servo"] == 50e-6
-    assert found["points"] == 65536
-    assert found["name"].startswith("(c) piezotrack")
+    assert answer["kind"] == "GCS2Device"
+    assert answer["axes"] == ["1"]
+    assert answer["version"] == 2.0
+    assert answer["ready"] is True
+    assert answer["servo"] == 50e-6
+    assert answer["points"] == 65536
+    assert answer["name"].startswith("(c) piezotrack")
     assert {"MOV", "SVA", "WAV", "WGO", "qDRR", "StopAll", "IsGeneratorRunning"} <= set(
-        found["functions"]
+        answer["functions"]
     )
 
 
 def test_it_drives_the_axis_in_open_and_closed_loop() -> None:
-    found = asked("""
+    answer = printed_by("""
 pi.SVO("1", False)
 pi.SVA("1", 30.0)
 found["servo"] = pi.qSVO("1")["1"]
@@ -108,18 +108,18 @@ found["second"] = pi.qPOS("1")["1"], pi.qMOV("1")["1"]
 found["while on"] = refused(pi.SVA, "1", 5.0), refused(pi.MOV, "1", 1000.0)
 found["stop"] = refused(pi.StopAll), refused(pi.STP), refused(pi.HLT)
 """)
-    assert found["servo"] is False
-    assert found["volts"] == [30.0, 30.0]
-    assert found["limits"] == list(LIMITS)
+    assert answer["servo"] is False
+    assert answer["volts"] == [30.0, 30.0]
+    assert answer["limits"] == list(LIMITS)
     # Voltage out of limits; a move with the servo off.
-    assert found["refused"] == [66, 5]
-    near = 0.005 * (found["travel"][1] - found["travel"][0])
+    assert answer["refused"] == [66, 5]
+    near = 0.005 * (answer["travel"][1] - answer["travel"][0])
     for name, target in (("first", 50.0), ("second", 30.0)):
-        position, commanded = found[name]
+        position, commanded = answer[name]
         assert commanded == target
         assert position == pytest.approx(target, abs=near)
-    assert found["while on"] == [79, 7]
-    assert found["stop"] == [10, 10, 10]
+    assert answer["while on"] == [79, 7]
+    assert answer["stop"] == [10, 10, 10]
 
 
 WAVE = 20.0 - 20.0 * np.cos(2.0 * np.pi * np.arange(200) / 200.0)
@@ -128,7 +128,7 @@ WAVE = 20.0 - 20.0 * np.cos(2.0 * np.pi * np.arange(200) / 200.0)
 @pytest.mark.slow
 def test_it_plays_a_wave_table_and_reads_the_data_recorder() -> None:
     words = json.dumps([round(float(value), 6) for value in WAVE])
-    found = asked(f"""
+    answer = printed_by(f"""
 wave = {words}
 pitools.writewavepoints(pi, 1, wave, bunchsize=10)
 found["length"] = pi.qWAV(1, 1)[1][1]
@@ -153,20 +153,20 @@ found["runs"] = pi.IsGeneratorRunning(1)[1]
 found["interval"] = header["SAMPLE_TIME"]
 found["position"], found["volts"] = data
 """)
-    assert found["length"] == 200.0
-    np.testing.assert_allclose(found["back"], WAVE, atol=1e-6)
-    assert found["runs"] is False
-    assert found["interval"] == 0.0005
-    np.testing.assert_allclose(found["volts"], np.tile(WAVE, 3), atol=1e-6)
+    assert answer["length"] == 200.0
+    np.testing.assert_allclose(answer["back"], WAVE, atol=1e-6)
+    assert answer["runs"] is False
+    assert answer["interval"] == 0.0005
+    np.testing.assert_allclose(answer["volts"], np.tile(WAVE, 3), atol=1e-6)
     device = pt.hardware.VirtualDevice(quiet_stage(), limits=LIMITS)
     table = np.tile([round(float(value), 6) for value in WAVE], 3)
     record = device.play(table, 2000.0)
-    np.testing.assert_allclose(found["position"], 1e6 * record.displacement, atol=1e-5)
+    np.testing.assert_allclose(answer["position"], 1e6 * record.displacement, atol=1e-5)
 
 
 @pytest.mark.slow
 def test_it_defines_waves_and_records_a_step() -> None:
-    found = asked(
+    answer = printed_by(
         """
 pi.WAV_LIN(2, 0, 100, "X", 10, 30.0, 5.0, 100)
 pi.WAV_RAMP(3, 0, 200, "X", 100, 10, 30.0, 0.0, 200)
@@ -186,9 +186,9 @@ found["step"] = data[0]
 """,
         speed=1.0,
     )
-    assert found["lengths"] == [100.0, 200.0, 200.0]
-    assert found["cleared"] == [0.0, 0.0, 200.0]
+    assert answer["lengths"] == [100.0, 200.0, 200.0]
+    assert answer["cleared"] == [0.0, 0.0, 200.0]
     # The stage's mode: the first peak is half a period after the step, at 160 Hz.
-    step = np.array(found["step"])
+    step = np.array(answer["step"])
     assert pytest.approx(0.5 * int(np.argmax(step[:20])), abs=1.01) == 1e3 * 0.5 / 160.0
     assert step[-1] == pytest.approx(step[-100:].mean(), rel=1e-3)

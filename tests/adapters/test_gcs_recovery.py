@@ -77,11 +77,11 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_after_one_bad_answer_the_output_ends_at_rest(
     work: Callable[[GcsDevice], None], after: str, number: int, fault: str
 ) -> None:
-    def spoil(line: str, said: str) -> Said:
+    def spoil(line: str, answer: str) -> Said:
         """Spoil what is said of the errors of one command."""
         sent = [one for one in there.lines if one.startswith(after)]
         is_due = line == "ERR?" and len(sent) == number and there.lines[-2] == sent[-1]
-        return FAULTS[fault](said) if is_due else said
+        return FAULTS[fault](answer) if is_due else answer
 
     there = Spoilt(spoil, speed=1.0)
     with connected(there, WAIT) as device:
@@ -144,12 +144,12 @@ def _interrupted(device: GcsDevice, there: Spoilt, after: float) -> float:
         pressed.append(time.monotonic())
         os.kill(os.getpid(), signal.SIGINT)
 
-    def spoil(_: str, said: str) -> Said:
+    def spoil(_: str, answer: str) -> Said:
         if "WGO 1 1" not in there.lines:
-            return said
+            return answer
         if not pressed and not timer.is_alive():
             timer.start()
-        return dripping(said.rstrip("\n") or "1")
+        return dripping(answer.rstrip("\n") or "1")
 
     timer = threading.Timer(after, press)
     there.spoil = spoil
@@ -248,10 +248,10 @@ def test_a_reading_far_beyond_the_travel_is_none(word: str) -> None:
 
 @pytest.mark.parametrize(("bad", "lost"), [(1, 1), (30, None)])
 def test_such_readings_are_lost_samples_of_a_log(bad: int, lost: int | None) -> None:
-    def spoil(line: str, said: str) -> Said:
+    def spoil(line: str, answer: str) -> Said:
         if not line.startswith("DRR?"):
-            return said
-        *lines, last = said.split("\n")
+            return answer
+        *lines, last = answer.split("\n")
         rows = range(len(lines) - 100, len(lines) - 100 + bad)
         for k in rows:
             lines[k] = f"9.91e37 {lines[k].split(' ')[1]} "

@@ -44,27 +44,27 @@ class Client:
 @contextmanager
 def client(server: GcsServer) -> Iterator[Client]:
     with socket.create_connection(("127.0.0.1", server.port), 30.0) as connection:
-        one = Client(connection)
+        connected = Client(connection)
         try:
-            yield one
+            yield connected
         finally:
-            one.close()
+            connected.close()
 
 
 def test_commands_are_cut_where_they_end(server: GcsServer) -> None:
-    with client(server) as one:
-        one.send("SVA 1 5\nSVA? 1\nCS")
-        assert one.answer() == "1=5\n"
-        one.send("V?\r\nSSN?\r")
-        assert one.answer() == "2.0\n"
-        assert one.answer() == "0\n"
+    with client(server) as peer:
+        peer.send("SVA 1 5\nSVA? 1\nCS")
+        assert peer.answer() == "1=5\n"
+        peer.send("V?\r\nSSN?\r")
+        assert peer.answer() == "2.0\n"
+        assert peer.answer() == "0\n"
         # Bytes without an end, before a command and alone.
-        one.send("\x09\x05VOL? 1\n")
-        assert [one.answer() for _ in range(3)] == ["0x0\n", "0x0\n", "1=5\n"]
-        one.send("\x07")
-        assert one.answer() == "\xb1\n"
-        one.send("\n\n \nERR?\n")
-        assert one.answer() == "0\n"
+        peer.send("\x09\x05VOL? 1\n")
+        assert [peer.answer() for _ in range(3)] == ["0x0\n", "0x0\n", "1=5\n"]
+        peer.send("\x07")
+        assert peer.answer() == "\xb1\n"
+        peer.send("\n\n \nERR?\n")
+        assert peer.answer() == "0\n"
 
 
 def test_lines_of_an_answer_have_a_space_but_for_the_last(server: GcsServer) -> None:
@@ -77,24 +77,24 @@ def test_lines_of_an_answer_have_a_space_but_for_the_last(server: GcsServer) -> 
 
 
 def test_a_refused_query_has_no_answer_and_an_error_that_is_read_once(server: GcsServer) -> None:
-    with client(server) as one, client(server) as other:
-        one.send("POS? 9\nERR?\nERR?\n")
-        assert [one.answer(), one.answer()] == ["15\n", "0\n"]
+    with client(server) as peer, client(server) as other:
+        peer.send("POS? 9\nERR?\nERR?\n")
+        assert [peer.answer(), peer.answer()] == ["15\n", "0\n"]
         # The last error counts, and the other client has none.
-        one.send("POS? 9\nFOO\n")
+        peer.send("POS? 9\nFOO\n")
         other.send("ERR?\n")
         assert other.answer() == "0\n"
-        one.send("ERR?\n")
-        assert one.answer() == "2\n"
+        peer.send("ERR?\n")
+        assert peer.answer() == "2\n"
 
 
 def test_a_command_too_long_is_an_error_and_no_more(server: GcsServer) -> None:
-    with client(server) as one:
-        one.send("WAV 1 X PNT 1 99999 " + "1 " * 99999 + "\nERR?\n")
+    with client(server) as peer:
+        peer.send("WAV 1 X PNT 1 99999 " + "1 " * 99999 + "\nERR?\n")
         # What is left of it may be a command that nobody knows.
-        assert one.answer() in ("2\n", "3\n")
-        one.send("CSV?\n")
-        assert one.answer() == "2.0\n"
+        assert peer.answer() in ("2\n", "3\n")
+        peer.send("CSV?\n")
+        assert peer.answer() == "2.0\n"
 
 
 def test_bytes_that_are_no_text_are_an_unknown_command(server: GcsServer) -> None:
@@ -104,21 +104,21 @@ def test_bytes_that_are_no_text_are_an_unknown_command(server: GcsServer) -> Non
 
 
 def test_a_client_that_goes_without_a_word_leaves_the_others(server: GcsServer) -> None:
-    with client(server) as one:
+    with client(server) as peer:
         for _ in range(5):
             with client(server) as other:
                 other.send("HLP?\nDRR?\nWA")
-        one.send("CSV?\n")
-        assert one.answer() == "2.0\n"
+        peer.send("CSV?\n")
+        assert peer.answer() == "2.0\n"
 
 
 def test_a_server_that_ends_closes_its_connections() -> None:
     server = GcsServer(quiet_stage())
-    with client(server) as one:
-        one.send("CSV?\n")
-        assert one.answer() == "2.0\n"
+    with client(server) as peer:
+        peer.send("CSV?\n")
+        assert peer.answer() == "2.0\n"
         server.close()
         server.close()
-        assert one.socket.recv(1) == b""
+        assert peer.socket.recv(1) == b""
     with pytest.raises(OSError, match=r"refused"):
         socket.create_connection(("127.0.0.1", server.port), 5.0)

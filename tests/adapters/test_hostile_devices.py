@@ -103,10 +103,10 @@ class Scpi:
 
     def __call__(self, line: str) -> Said:
         self.sent += self.begin is not None and line.startswith(self.begin)
-        said = self.inside.answer(line)
-        if said is None:
+        answer = self.inside.answer(line)
+        if answer is None:
             return ""
-        return self.fault(f"{said}\n") if self.sent >= self.count else f"{said}\n"
+        return self.fault(f"{answer}\n") if self.sent >= self.count else f"{answer}\n"
 
     def address(self, port: int) -> str:
         timeout = f"timeout={1e3 * TIMEOUT:g}ms"

@@ -80,8 +80,8 @@ def test_joined_is_one_line_and_apart_two(
 
     monkeypatch.setattr(there, "answer", spy)
     host, port = there.address
-    own = pt.hardware.ScpiDevice(host, port, unit="um", limits=(0.0, 75.0))
-    ways = {"own": own.exchange, "joined": amplifier.joined, "apart": amplifier.apart}
+    device = pt.hardware.ScpiDevice(host, port, unit="um", limits=(0.0, 75.0))
+    ways = {"own": device.exchange, "joined": amplifier.joined, "apart": amplifier.apart}
     for name, exchange in ways.items():
         lines.clear()
         times = []
@@ -93,4 +93,4 @@ def test_joined_is_one_line_and_apart_two(
         record_property(name, str(trip))
         print(f"{name}: {trip}")
         assert len(lines) == COUNT * (2 if name == "apart" else 1)
-    own.close()
+    device.close()

@@ -282,10 +282,10 @@ def test_a_play_that_is_cut_off_ends_at_rest() -> None:
             pt.measure(device, np.full(100, 40.0), rate=100.0, ramp=0.1)
         device.close()
         # The instrument itself says what it puts out.
-        asked = misbehaved(place, exchange="VOLT?;:VOLT {volts:.6f};:VOLT?")
+        failing = misbehaved(place, exchange="VOLT?;:VOLT {volts:.6f};:VOLT?")
         with pytest.raises(pt.DeviceError, match=r"with '0;1'"):
-            asked.exchange(1.0)
-        asked.close()
+            failing.exchange(1.0)
+        failing.close()
 
 
 def test_after_a_lost_connection_the_output_can_still_be_led_home() -> None:

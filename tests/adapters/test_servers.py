@@ -243,11 +243,11 @@ def test_a_line_of_many_queries_has_no_answer_of_any_length(
     assert once is not None
     assert len(once) > 800_000
     assert instrument.answer(";".join(["FETC?"] * 900)) is None
-    said = instrument.answer("SYST:ERR?")
-    assert said is not None
-    assert said.startswith("-430")
+    answer = instrument.answer("SYST:ERR?")
+    assert answer is not None
+    assert answer.startswith("-430")
     assert instrument.answer(";".join(["VOLT?"] * 2000)) is None
-    said = instrument.answer("SYST:ERR?")
-    assert said is not None
-    assert said.startswith("-223")
+    answer = instrument.answer("SYST:ERR?")
+    assert answer is not None
+    assert answer.startswith("-223")
     assert math.isfinite(float(instrument.answer("MEAS?") or "nan"))

@@ -31,15 +31,15 @@ def test_many_logs_become_models_and_a_picture() -> None:
     printed = ran("campaign", "a.csv", "b.csv", "flat.csv", *KIND, "--parquet")
     assert "campaign in campaign: 3 records, 1 model, 3 tasks, 1 without a model" in printed
     assert "failed  flat.csv, prandtl-ishlinskii: the drive is constant" in printed
-    found = pt.identification.Campaign.load("campaign")
-    assert found.records == ["a.csv", "b.csv", "flat.csv"]
+    campaign = pt.identification.Campaign.load("campaign")
+    assert campaign.records == ["a.csv", "b.csv", "flat.csv"]
     alone = pt.identify(pt.read("a.csv"), PLAYS)
-    assert pt.load(found[0].file).model == alone.model
+    assert pt.load(campaign[0].file).model == alone.model
     frame = pd.read_parquet("campaign/campaign.parquet")
-    assert list(frame["record"]) == found.records
+    assert list(frame["record"]) == campaign.records
     assert {"campaign.json", "campaign.png", "campaign.svg"} <= set(names("campaign"))
     # Run again with a log more: it says the same, and that of the new one.
-    before = {one.task: one.file.stat().st_mtime_ns for one in found if one.error is None}
+    before = {one.task: one.file.stat().st_mtime_ns for one in campaign if one.error is None}
     write_log(log(0.8), Path("c.csv"))
     shown = json.loads(ran("campaign", "a.csv", "b.csv", "c.csv", *KIND, "--json"))
     assert [one["record"] for one in shown["results"]] == ["a.csv", "b.csv", "c.csv"]
@@ -50,8 +50,8 @@ def test_many_logs_become_models_and_a_picture() -> None:
 def test_options_of_identify_and_seeds_reach_the_tasks() -> None:
     options = ("--runs", "1", "--history", "virgin", "--fix", "a1=122", "--window", "1:5")
     ran("campaign", "a.csv", "--model", "dahl", "--seeds", "3:5", *options, "--quiet")
-    found = pt.identification.Campaign.load("campaign")
-    assert [one.seed for one in found] == [3, 4]
+    campaign = pt.identification.Campaign.load("campaign")
+    assert [one.seed for one in campaign] == [3, 4]
     fit = pt.identify(
         pt.read("a.csv")[1.0:5.0],
         "dahl",
@@ -59,7 +59,7 @@ def test_options_of_identify_and_seeds_reach_the_tasks() -> None:
         history="virgin",
         parameters={"a1": 122.0},
     )
-    assert found[0].fit.model == fit.model
+    assert campaign[0].fit.model == fit.model
 
 
 def test_logs_of_one_name_are_told_apart_by_their_folders() -> None:

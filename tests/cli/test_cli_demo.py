@@ -49,25 +49,25 @@ def test_the_logs_are_the_measured_ones(printed: tuple[Path, str]) -> None:
 
 def test_the_model_is_as_good_as_it_says_on_the_other_log(printed: tuple[Path, str]) -> None:
     folder, text = printed
-    said = re.search(r"other log, not fitted: rms (\S+) um \((\S+) % of stroke\)", text)
-    assert said is not None
+    match = re.search(r"other log, not fitted: rms (\S+) um \((\S+) % of stroke\)", text)
+    assert match is not None
     model = pt.load(folder / "demo" / "asymmetric-prandtl-ishlinskii.json")
     score = model.score(pt.read(folder / "demo" / "other.csv")[3.0:])
-    assert 1e6 * score.rms == pytest.approx(float(said[1]), rel=1e-3)
+    assert 1e6 * score.rms == pytest.approx(float(match[1]), rel=1e-3)
     # A Dahl model leaves 1.2 %, and the noise of the sensor 0.1 %.
-    assert 0.2 < float(said[2]) < 0.45
+    assert 0.2 < float(match[2]) < 0.45
 
 
 def test_each_part_of_the_controller_lowers_the_error(printed: tuple[Path, str]) -> None:
-    found = re.findall(r"^  (\S.*?) +max (\S+) um, rms (\S+) um", printed[1], re.MULTILINE)
-    assert [name for name, *_ in found] == ["without compensation", "inverse", "inverse and PID"]
-    before, inverse, both = (float(largest) for _, largest, _ in found)
+    matches = re.findall(r"^  (\S.*?) +max (\S+) um, rms (\S+) um", printed[1], re.MULTILINE)
+    assert [name for name, *_ in matches] == ["without compensation", "inverse", "inverse and PID"]
+    before, inverse, both = (float(largest) for _, largest, _ in matches)
     # A piezo's loop is about a tenth to a fifth of its 37 um of travel.
     assert 37 * 0.08 < before < 37 * 0.2
     assert inverse < before / 2
     # Of the largest error of the readings, 0.3 um is the noise: five times 65 nm.
     assert both - 0.3 < (inverse - 0.3) / 2
-    assert float(found[2][2]) < float(found[1][2]) / 2
+    assert float(matches[2][2]) < float(matches[1][2]) / 2
 
 
 def test_what_it_advises_to_type_runs(

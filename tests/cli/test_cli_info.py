@@ -21,11 +21,11 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_info_in_words() -> None:
-    said = ran("info", "log.csv")
+    output = ran("info", "log.csv")
     for piece in ("log.csv  CSV, 3 columns", "voltage_V", "rate", "gaps      none", "reverses"):
-        assert piece in said
-    assert "can determine" in said
-    assert "is not read" not in said
+        assert piece in output
+    assert "can determine" in output
+    assert "is not read" not in output
 
 
 def test_info_as_a_document() -> None:
@@ -145,14 +145,14 @@ def test_identify_and_compare_decimate() -> None:
     pt.Dataset(u=u, y=y, t=t).save("log.csv")
     ran("convert", "log.csv", "half.npz", "--decimate", "2")
     words = ("--decimate", "2", "--json", "--out")
-    one = json.loads(ran("identify", "log.csv", *kind, *words, "one"))
+    whole = json.loads(ran("identify", "log.csv", *kind, *words, "one"))
     two = json.loads(ran("identify", "half.npz", *kind, "--json", "--out", "two"))
-    assert one["models"][0]["parameters"] == two["models"][0]["parameters"]
-    one = json.loads(ran("compare", "log.csv", *kind, *words, "three"))
+    assert whole["models"][0]["parameters"] == two["models"][0]["parameters"]
+    whole = json.loads(ran("compare", "log.csv", *kind, *words, "three"))
     two = json.loads(ran("compare", "half.npz", *kind, "--json", "--out", "four"))
-    for table in (one, two):
+    for table in (whole, two):
         table.pop("written")
-    assert str(one).replace("log.csv", "half.npz") == str(two)
+    assert str(whole).replace("log.csv", "half.npz") == str(two)
 
 
 def test_a_model_is_not_taken_for_a_log() -> None:

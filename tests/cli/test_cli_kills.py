@@ -116,16 +116,16 @@ def kill_often(work: list[str], tries: int) -> None:
             # Most of what is written is written at the end.
             threading.Event().wait(moments.uniform(0.4, 1.05) * took + 0.5 * slowly)
             process.kill()
-        found = content(out)
-        assert all(found[name] in (old[name], new[name]) for name in old), "torn"
-        mixed = len({found[name] == new[name] for name in differing}) == 2
-        assert MARKER in found or not mixed, "mixed"
-        assert all(is_temporary(name) for name in found.keys() - old.keys() - {MARKER})
+        files = content(out)
+        assert all(files[name] in (old[name], new[name]) for name in old), "torn"
+        mixed = len({files[name] == new[name] for name in differing}) == 2
+        assert MARKER in files or not mixed, "mixed"
+        assert all(is_temporary(name) for name in files.keys() - old.keys() - {MARKER})
         # The next run, with another result.
         write_document(Path(out, "next.json"), {})
-        found = content(out)
-        del found["next.json"]
-        assert found in (old, new)
+        files = content(out)
+        del files["next.json"]
+        assert files in (old, new)
 
 
 @pytest.mark.slow

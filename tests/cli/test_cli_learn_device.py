@@ -130,12 +130,12 @@ def test_a_controller_in_another_process_learns_the_same() -> None:
         assert there.voltage == 0.0
         there.close()
     again = ran(*LEARN, *VIRTUAL, "--trials", "4", "--overwrite")
-    one, other = (
+    errors, other = (
         errors_of([x for x in text.splitlines() if x.strip()]) for text in (printed, again)
     )
     # The servo clock of 20 kHz reads the voltage within the sample, not at its beginning.
-    assert one[0] == pytest.approx(other[0], rel=0.2)
-    assert one[-1] < 0.1 * one[0]
+    assert errors[0] == pytest.approx(other[0], rel=0.2)
+    assert errors[-1] < 0.1 * errors[0]
 
 
 @pytest.mark.slow
@@ -161,13 +161,13 @@ def test_a_signal_leads_the_output_to_rest_and_keeps_the_table(
                 while there.voltage <= 10.0:
                     assert child.poll() is None
                 child.send_signal(number)
-                _, said = child.communicate(timeout=60.0)
+                _, message = child.communicate(timeout=60.0)
             finally:
                 child.kill()
         assert there.voltage == 2.5
         there.close()
     assert child.returncode == code
-    assert said == f"piezotrack: {word}; the best table so far, of trial 0, is in kept.csv\n"
+    assert message == f"piezotrack: {word}; the best table so far, of trial 0, is in kept.csv\n"
     written = table("kept.csv")
     np.testing.assert_allclose(written["voltage_V"], written["feedforward_V"], rtol=1e-9)
 

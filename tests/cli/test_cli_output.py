@@ -127,10 +127,10 @@ def test_settings_of_least_squares_reach_the_fit() -> None:
     ran("identify", "log.csv", "--model", "prandtl-ishlinskii", *options.split(), "--quiet")
     settings = LeastSquares(count=5, dead_zones=1, dynamics="first", creep=[0.5, 2.0])
     fit = pt.identify(pt.read("log.csv"), "prandtl-ishlinskii", method=settings)
-    found = pt.load("results/prandtl-ishlinskii.json").model
-    assert found == fit.model
-    assert (len(found.weights), found.creep_times) == (5, (0.5, 2.0))
-    assert found.time_constant is not None
+    model = pt.load("results/prandtl-ishlinskii.json").model
+    assert model == fit.model
+    assert (len(model.weights), model.creep_times) == (5, (0.5, 2.0))
+    assert model.time_constant is not None
     nothing = ("--plays", "2", "--asymmetry", "0", "--dynamics", "none", "--creep", "none")
     models = ("--model", "prandtl-ishlinskii", "--model", "dahl", "--runs", "1")
     ran("identify", "log.csv", *models, *nothing, "--quiet", "--overwrite")

@@ -340,9 +340,9 @@ def test_a_noise_that_is_none_is_refused_in_the_unit_that_was_typed(
 
 def test_a_reference_beyond_reach_is_refused_without_an_option_that_tune_lacks() -> None:
     write_model()
-    said = refusal(
+    message = refusal(
         "tune", "dahl.json", "--reference", "sine:1Hz,10..900um,2s", "--dt", "0.02", *LIMITS
     )
-    assert "900 um" in said
-    assert "reaches from" in said
-    assert "largest_saturation" not in said
+    assert "900 um" in message
+    assert "reaches from" in message
+    assert "largest_saturation" not in message

@@ -73,8 +73,8 @@ def test_what_cannot_be_served_is_refused() -> None:
     write_model()
     assert refusal("serve", "gcs", "--model", "none.json").startswith("none.json: no such file")
     # It was never identified from a record.
-    said = refusal("serve", "gcs", "--model", "dahl.json")
-    assert said.startswith("--limits is not given, and dahl.json does not say")
+    message = refusal("serve", "gcs", "--model", "dahl.json")
+    assert message.startswith("--limits is not given, and dahl.json does not say")
     for limits in ("75:0", "0:0", "0:inf", "nan:1"):
         assert refusal("serve", "gcs", "--limits", limits).startswith("--limits ")
     assert refusal("serve", "gcs", "--limits", "75").startswith("--limits has '75'")
@@ -83,5 +83,7 @@ def test_what_cannot_be_served_is_refused() -> None:
         assert refusal("serve", "gcs", "--speed", speed).startswith(f"--speed is {speed}: expected")
     assert refusal("serve", "gcs", "--host", "256.0.0.1").startswith("--host is '256.0.0.1'")
     with GcsServer(quiet_stage()) as server:
-        said = refusal("serve", "gcs", "--port", str(server.port))
-    assert said.startswith(f"--port is {server.port}: expected an address that can be listened at")
+        message = refusal("serve", "gcs", "--port", str(server.port))
+    assert message.startswith(
+        f"--port is {server.port}: expected an address that can be listened at"
+    )

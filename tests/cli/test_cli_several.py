@@ -67,10 +67,10 @@ def test_several_logs_give_one_model() -> None:
 def test_an_option_given_once_is_for_all_logs() -> None:
     given = ("--delay", "fit", "--window", "1:", "--json")
     document = json.loads(ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, *given))
-    (found,) = document["models"]
-    delays = [one["delay"]["value"] for one in found["records"]]
+    (model,) = document["models"]
+    delays = [one["delay"]["value"] for one in model["records"]]
     assert delays == pytest.approx([0.0, 5 * DT], abs=5e-4)
-    assert [one["data"]["window_s"][0] for one in found["records"]] == [1.0, 1.0]
+    assert [one["data"]["window_s"][0] for one in model["records"]] == [1.0, 1.0]
 
 
 @pytest.mark.usefixtures("_no_pictures")
@@ -78,10 +78,10 @@ def test_several_logs_share_the_creep_of_a_model_that_is_searched() -> None:
     document = json.loads(
         ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, "--creep", "1,5", "--json")
     )
-    (found,) = document["models"]
-    assert found["parameters"]["creep_times"]["value"] == [1.0, 5.0]
+    (model,) = document["models"]
+    assert model["parameters"]["creep_times"]["value"] == [1.0, 5.0]
     # The stage has none.
-    assert max(found["parameters"]["creep_weights"]["value"]) < 1e-3
+    assert max(model["parameters"]["creep_weights"]["value"]) < 1e-3
 
 
 @pytest.mark.slow

@@ -70,11 +70,11 @@ def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> Non
     without = pt.track(stage, pt.Controller.of(known, dt=0.02), reference, timing=timing)
     assert run.metrics.rms_error < without.metrics.rms_error
     margins = pt.check_loop(known, loop, delay=0.002)
-    for one in (margins.low, margins.middle, margins.high):
-        assert one.stable
-        assert one.sensitivity <= 2.0 * 1.01
-        assert (one.gain_margin or math.inf) >= 2.0 * 0.99
-        assert (one.phase_margin or math.pi) >= math.radians(30.0) * 0.99
+    for margin in (margins.low, margins.middle, margins.high):
+        assert margin.stable
+        assert margin.sensitivity <= 2.0 * 1.01
+        assert (margin.gain_margin or math.inf) >= 2.0 * 0.99
+        assert (margin.phase_margin or math.pi) >= math.radians(30.0) * 0.99
     kept = {one["name"]: one["value"] for one in document["kept"]}
     worst = max(one.sensitivity for one in (margins.low, margins.middle, margins.high))
     assert kept["sensitivity"] == pytest.approx(worst)
@@ -177,10 +177,10 @@ def test_margins_out_of_reach_are_refused() -> None:
 @pytest.mark.usefixtures("_no_pictures")
 def test_a_gain_margin_out_of_reach_is_named_with_the_nearest() -> None:
     """The search itself ranks unstable gains before those that are short by so much."""
-    said = refusal("tune", "dahl.json", *QUICK, "--gain-margin", "1e9")
-    assert said.startswith("--gain-margin is 1e+09: expected one that some gains can keep")
-    (nearest,) = re.findall(r"the nearest have ([0-9.e+]+) \(", said)
-    (factor,) = re.findall(r", ([0-9.e+]+) times too low$", said)
+    message = refusal("tune", "dahl.json", *QUICK, "--gain-margin", "1e9")
+    assert message.startswith("--gain-margin is 1e+09: expected one that some gains can keep")
+    (nearest,) = re.findall(r"the nearest have ([0-9.e+]+) \(", message)
+    (factor,) = re.findall(r", ([0-9.e+]+) times too low$", message)
     assert float(nearest) * float(factor) == pytest.approx(1e9, rel=1e-3)
     # What is said to be nearest can be kept, and not much more.
     ran("tune", "dahl.json", *QUICK, "--gain-margin", f"{0.9 * float(nearest)}")

@@ -181,15 +181,15 @@ def numbers(name: str | None, *values: float) -> Numbers:
 
 @pytest.fixture(scope="module")
 def library() -> ctypes.CDLL:
-    found = ctypes.CDLL(str(LIBRARY))
-    found.piezotrack_new.restype = ctypes.c_void_p
-    found.piezotrack_step.restype = ctypes.c_double
-    found.piezotrack_step.argtypes = (ctypes.c_void_p, *[ctypes.c_double] * 3)
-    found.piezotrack_start.restype = found.piezotrack_applied.restype = ctypes.c_bool
-    found.piezotrack_start.argtypes = (ctypes.c_void_p, ctypes.c_double)
-    found.piezotrack_applied.argtypes = (ctypes.c_void_p, ctypes.c_double)
-    found.piezotrack_reset.argtypes = found.piezotrack_free.argtypes = (ctypes.c_void_p,)
-    return found
+    compiled = ctypes.CDLL(str(LIBRARY))
+    compiled.piezotrack_new.restype = ctypes.c_void_p
+    compiled.piezotrack_step.restype = ctypes.c_double
+    compiled.piezotrack_step.argtypes = (ctypes.c_void_p, *[ctypes.c_double] * 3)
+    compiled.piezotrack_start.restype = compiled.piezotrack_applied.restype = ctypes.c_bool
+    compiled.piezotrack_start.argtypes = (ctypes.c_void_p, ctypes.c_double)
+    compiled.piezotrack_applied.argtypes = (ctypes.c_void_p, ctypes.c_double)
+    compiled.piezotrack_reset.argtypes = compiled.piezotrack_free.argtypes = (ctypes.c_void_p,)
+    return compiled
 
 
 def pid_settings(**other: Any) -> Settings:

@@ -70,36 +70,36 @@ def test_the_same_comparison_gives_the_same_file() -> None:
 
 
 def test_a_loop_with_more_gain_is_worse_and_one_beyond_its_margin_is_unstable() -> None:
-    found = compared(controllers=["inverse", "inverse + PID"])
-    assert found.variants[:2] == ("as tuned for", "1.3 times the gain")
-    inverse = found.rows[0]
+    comparison = compared(controllers=["inverse", "inverse + PID"])
+    assert comparison.variants[:2] == ("as tuned for", "1.3 times the gain")
+    inverse = comparison.rows[0]
     # Without feedback, 30 % more gain are 30 % of 40 um off and more.
     assert inverse.rms(1) > 8e-6
-    assert all(math.isfinite(row.rms(i)) for row in found.rows for i in range(5))
+    assert all(math.isfinite(row.rms(i)) for row in comparison.rows for i in range(5))
 
 
 def test_what_cannot_follow_a_motion_has_no_figure_there() -> None:
     steps = pt.staircase(dwell=0.1, steps=4, low=20e-6, high=60e-6)
     sine = pt.sine(frequency=5.0, low=20e-6, high=60e-6, duration=1.2)
-    found = compared(references=[sine, steps], controllers=["inverse + PID + repetitive"])
-    assert found.rows[0].cells[0][0] is not None
-    assert found.rows[0].cells[0][1] is None
-    assert "-" in str(found)
+    comparison = compared(references=[sine, steps], controllers=["inverse + PID + repetitive"])
+    assert comparison.rows[0].cells[0][0] is not None
+    assert comparison.rows[0].cells[0][1] is None
+    assert "-" in str(comparison)
 
 
 def test_what_could_not_be_made_says_why() -> None:
-    found = compared(controllers=["inverse", "network"])
-    assert "record is missing" in found.refused["network"]
-    assert "not made: network" in str(found)
+    comparison = compared(controllers=["inverse", "network"])
+    assert "record is missing" in comparison.refused["network"]
+    assert "not made: network" in str(comparison)
     with pytest.raises(pt.ParameterError, match=r"not one could be made; network: record"):
         compared(controllers=["network"])
     once = pt.chirp(start_frequency=1.0, stop_frequency=5.0, low=20e-6, high=60e-6, duration=2.0)
     names = ["inverse", "inverse + PID + repetitive", "inverse + PID + learning"]
-    found = compared(controllers=names, references=[once])
-    assert [row.name for row in found.rows] == ["inverse"]
+    comparison = compared(controllers=names, references=[once])
+    assert [row.name for row in comparison.rows] == ["inverse"]
     for name in names[1:]:
-        assert found.refused[name].startswith("references: expected one at least")
-    assert max(map(len, str(found).splitlines())) <= 100
+        assert comparison.refused[name].startswith("references: expected one at least")
+    assert max(map(len, str(comparison).splitlines())) <= 100
 
 
 def noisy(seed: int) -> pt.VirtualStage:
@@ -108,11 +108,11 @@ def noisy(seed: int) -> pt.VirtualStage:
 
 def test_each_is_judged_by_draws_of_the_noise_other_than_that_it_was_tuned_with() -> None:
     sine = pt.sine(frequency=5.0, low=20e-6, high=60e-6, duration=1.2)
-    found = pt.compare_controllers(
+    comparison = pt.compare_controllers(
         noisy(3), plays(1.05), dt=1e-3, limits=LIMITS, references=[sine], seeds=8,
         controllers=["inverse", "inverse + PID"], parts="pid", **QUICK,
     )  # fmt: skip
-    inverse, pid = found.rows
+    inverse, pid = comparison.rows
     cell = pid.cells[0][0]
     assert cell is not None
     assert len(cell.draws) == len(set(cell.draws)) == 8
@@ -131,18 +131,18 @@ def test_each_is_judged_by_draws_of_the_noise_other_than_that_it_was_tuned_with(
     # One reference: over all of them is along it. Without feedback noise does nothing.
     assert (pid.rms(), pid.spread()) == pytest.approx((cell.rms, cell.spread))
     assert inverse.spread() == pytest.approx(0.0, abs=1e-15)
-    assert f"± {1e9 * cell.spread:.1g}" in str(found)
+    assert f"± {1e9 * cell.spread:.1g}" in str(comparison)
 
 
 def test_chatter_is_the_fast_part_of_the_command_of_the_runs() -> None:
     sine = pt.sine(frequency=5.0, low=20e-6, high=60e-6, duration=1.2)
     # Above a quarter of the sampling rate.
     quick = pt.sine(frequency=260.0, low=39.8e-6, high=40.2e-6, duration=0.3)
-    found = pt.compare_controllers(
+    comparison = pt.compare_controllers(
         noisy(3), plays(1.05), dt=1e-3, limits=LIMITS, references=[sine, quick, sine],
         controllers=["inverse", "inverse + PID"], parts="pid", **QUICK,
     )  # fmt: skip
-    inverse, pid = found.rows
+    inverse, pid = comparison.rows
     cell = pid.cells[0][0]
     assert cell is not None
     assert cell.chatter is not None
@@ -167,24 +167,24 @@ def test_chatter_is_the_fast_part_of_the_command_of_the_runs() -> None:
 
 
 def test_one_draw_has_no_spread() -> None:
-    found = compared(controllers=["inverse + PID"], seeds=1)
-    assert math.isnan(found.rows[0].spread())
-    assert "±" not in str(found)
-    assert "one draw of the noise" in str(found)
-    figures = found.document()["controllers"][0]["figures"][0][0]
+    comparison = compared(controllers=["inverse + PID"], seeds=1)
+    assert math.isnan(comparison.rows[0].spread())
+    assert "±" not in str(comparison)
+    assert "one draw of the noise" in str(comparison)
+    figures = comparison.document()["controllers"][0]["figures"][0][0]
     assert figures["spread"] is None
     assert figures["draws"] == [figures["rms"]]
 
 
 def test_the_tables_fit_a_terminal_and_a_notebook() -> None:
     names = ["inverse", "inverse + perturbation-estimator"]
-    found = compared(controllers=names, references=None, rates=(2.0, 5.0, 20.0))
-    lines = str(found).splitlines()
+    comparison = compared(controllers=names, references=None, rates=(2.0, 5.0, 20.0))
+    lines = str(comparison).splitlines()
     assert max(map(len, lines)) <= 100
     assert lines[0].startswith("true error in nm rms at 1000 Hz, mean of 3 draws of the noise")
     # Each table has each of them.
     assert sum(line.startswith("inverse + perturbation") for line in lines) == 4
-    html = found._repr_html_()
+    html = comparison._repr_html_()
     assert html.count("<table>") == html.count("</table>") == 4
     assert "<th>inverse + perturbation-estimator</th>" in html
 

@@ -143,7 +143,7 @@ def test_the_contour_error_of_a_general_path_is_the_distance_from_it() -> None:
     random = np.random.default_rng(1)
     t = random.uniform(0.0, 5.0, 40)
     x, y = (axis.motion(t)[0] + random.normal(0.0, 0.3 * UM, 40) for axis in path.axes)
-    found = path.errors(x, y)
+    errors = path.errors(x, y)
     assert path.radius is None
 
     def distance(s: float, k: int) -> float:
@@ -161,7 +161,7 @@ def test_the_contour_error_of_a_general_path_is_the_distance_from_it() -> None:
             method="bounded",
             options={"xatol": 1e-12},
         )
-        assert abs(found[k]) == pytest.approx(best.fun, abs=2e-10)
+        assert abs(errors[k]) == pytest.approx(best.fun, abs=2e-10)
 
 
 def test_left_of_the_direction_is_positive() -> None:
@@ -188,10 +188,10 @@ def test_axes_alone_have_the_bits_of_track() -> None:
 
 def test_the_same_seed_gives_the_same_bits() -> None:
     path = pt.circle(frequency=0.5, radius=10 * UM)
-    one, other = (pt.contour(pt.XYStage.xu_li_2010(seed=4), led(), path) for _ in range(2))
-    assert np.array_equal(one.y.measured, other.y.measured)
+    first, other = (pt.contour(pt.XYStage.xu_li_2010(seed=4), led(), path) for _ in range(2))
+    assert np.array_equal(first.y.measured, other.y.measured)
     third = pt.contour(pt.XYStage.xu_li_2010(seed=5), led(), path)
-    assert not np.array_equal(one.y.measured, third.y.measured)
+    assert not np.array_equal(first.y.measured, third.y.measured)
 
 
 def test_the_lag_moves_y_and_leaves_x() -> None:
@@ -199,12 +199,12 @@ def test_the_lag_moves_y_and_leaves_x() -> None:
     path = pt.circle(frequency=0.5, radius=10 * UM)
     stage = pt.XYStage(x=TABLE_1, y=TABLE_1)
     late = dataclasses.replace(stage, lag=3 * DT)
-    one, other = (pt.contour(one, led(), path) for one in (stage, late))
-    assert np.array_equal(one.x.measured, other.x.measured)
-    assert np.allclose(one.y.measured[:-3], other.y.measured[3:], rtol=0, atol=1e-13)
+    even, other = (pt.contour(each, led(), path) for each in (stage, late))
+    assert np.array_equal(even.x.measured, other.x.measured)
+    assert np.allclose(even.y.measured[:-3], other.y.measured[3:], rtol=0, atol=1e-13)
     # Its controller saw nothing of that.
-    assert np.allclose(one.y.loop_error[:-3], other.y.loop_error[3:], rtol=0, atol=1e-13)
-    assert not np.allclose(one.y.error[:-3], other.y.error[3:], rtol=0, atol=1e-7)
+    assert np.allclose(even.y.loop_error[:-3], other.y.loop_error[3:], rtol=0, atol=1e-13)
+    assert not np.allclose(even.y.error[:-3], other.y.error[3:], rtol=0, atol=1e-7)
     # R sin(b) / sqrt 8 on top of what the two had before.
     angle = math.tau * 0.5 * 3 * DT
     assert other.metrics.sd_error == pytest.approx(10 * UM * math.sin(angle) / 8**0.5, rel=0.1)
@@ -214,8 +214,8 @@ def test_missed_ticks_move_y_by_whole_samples_and_leave_x() -> None:
     path = pt.circle(frequency=0.5, radius=10 * UM, duration=12.0)
     stage = pt.XYStage(x=TABLE_1, y=TABLE_1)
     late = dataclasses.replace(stage, missed_ticks=0.2, most_behind=3)
-    one, other = (pt.contour(one, led(), path) for one in (stage, late))
-    assert np.array_equal(one.x.measured, other.x.measured)
+    even, other = (pt.contour(each, led(), path) for each in (stage, late))
+    assert np.array_equal(even.x.measured, other.x.measured)
     # What its controller followed is the path, 0 to 3 samples before.
     followed = other.y.loop_error + other.y.measured
     whole = np.arange(followed.size)
@@ -223,11 +223,11 @@ def test_missed_ticks_move_y_by_whole_samples_and_leave_x() -> None:
     assert np.min(off, axis=0).max() < 1e-13
     behind = np.argmin(off, axis=0)[100:]
     assert set(behind) == {0, 1, 2, 3}
-    assert other.metrics.sd_error > 2 * one.metrics.sd_error
+    assert other.metrics.sd_error > 2 * even.metrics.sd_error
     # No chance, or no sample to fall behind by: the same bits.
     for chance, most in ((0.0, 3), (0.2, 0)):
         same = dataclasses.replace(stage, missed_ticks=chance, most_behind=most)
-        assert np.array_equal(pt.contour(same, led(), path).y.measured, one.y.measured)
+        assert np.array_equal(pt.contour(same, led(), path).y.measured, even.y.measured)
 
 
 def test_the_mean_error_of_a_viscous_stage_under_pid_is_as_computed() -> None:
@@ -272,26 +272,27 @@ def logs(stage: pt.XYStage) -> tuple[Any, Any]:
 def test_cross_talk_is_found_and_decoupled() -> None:
     true = (0.10, -0.08)
     stage = dataclasses.replace(STAGE, cross_talk=true, lag=0.0)
-    found = pt.identification.identify_cross_talk(*logs(stage))
-    assert np.diag(found.matrix).tolist() == [1.0, 1.0]
+    cross_talk = pt.identification.identify_cross_talk(*logs(stage))
+    assert np.diag(cross_talk.matrix).tolist() == [1.0, 1.0]
     for place, share in (((0, 1), true[0]), ((1, 0), true[1])):
-        assert 0.0 < found.sd[place] < 1e-3
-        assert abs(found.matrix[place] - share) < max(4.0 * found.sd[place], 2e-4)
-    assert "of y in x" in str(found)
+        assert 0.0 < cross_talk.sd[place] < 1e-3
+        assert abs(cross_talk.matrix[place] - share) < max(4.0 * cross_talk.sd[place], 2e-4)
+    assert "of y in x" in str(cross_talk)
     # With an inverse that is exact there is nothing left but what decoupling removes.
     exact = pt.XYStage(x=TABLE_1, y=TABLE_1, cross_talk=true)
     forward = both(feedforward=TABLE_1.inverse(), limits=(-50.0, 150.0))
     path = pt.circle(frequency=0.1, radius=40 * UM)
     as_is, decoupled = (
         pt.contour(exact, forward, path, decoupling=matrix).score(true=True)
-        for matrix in (None, found.matrix)
+        for matrix in (None, cross_talk.matrix)
     )
     assert as_is.peak_to_peak > 3 * UM
     assert decoupled.peak_to_peak < 0.3 * as_is.peak_to_peak
     # On the virtual stage, whose inverse is not exact, feedforward alone gains as well.
     alone = both(feedforward=fitted().inverse())
     as_is, decoupled = (
-        pt.contour(stage, alone, path, decoupling=matrix).metrics for matrix in (None, found.matrix)
+        pt.contour(stage, alone, path, decoupling=matrix).metrics
+        for matrix in (None, cross_talk.matrix)
     )
     assert decoupled.mean_error**2 < as_is.mean_error**2 or decoupled.rms_error < as_is.rms_error
 

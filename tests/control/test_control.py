@@ -152,12 +152,12 @@ def test_the_parts_of_a_command_add_up() -> None:
 def test_sessions_know_nothing_of_each_other() -> None:
     reference = sine(250)
     alone = drive(FULL.start(), reference)[1]
-    one, other = FULL.start(), FULL.start()
+    session, other = FULL.start(), FULL.start()
     x = 0.0
     for desired, expected in zip(reference.tolist(), alone, strict=True):
         other.step(-desired, math.nan if desired > 50e-6 else 3e-6)
-        volts = one.step(desired, x)
-        assert one.last == expected
+        volts = session.step(desired, x)
+        assert session.last == expected
         x += 0.7 * (GAIN * volts - x)
 
 

@@ -86,11 +86,11 @@ def commands(controller: pt.Controller) -> list[float]:
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_comes_back_to_the_last_bit(name: str) -> None:
     law = LAWS[name]
-    one = loop(feedback=law, limits=(-1e3 * THIRD, 1e3))
-    other = back(one)
+    controller = loop(feedback=law, limits=(-1e3 * THIRD, 1e3))
+    other = back(controller)
     if law is not None and not isinstance(law, pt.control.StateSpace):
         assert other.feedback == law
-    assert commands(other) == commands(one)
+    assert commands(other) == commands(controller)
     # A second turn writes the same file.
     first = Path("loop.json").read_bytes()
     other.save("loop.json")
@@ -99,10 +99,10 @@ def test_a_law_comes_back_to_the_last_bit(name: str) -> None:
 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_a_repetitive_part_comes_back_to_the_last_bit(name: str) -> None:
-    one = loop(feedback=PID, repetitive=LEARNERS[name])
-    other = back(one)
-    assert other == one
-    assert commands(other) == commands(one)
+    controller = loop(feedback=PID, repetitive=LEARNERS[name])
+    other = back(controller)
+    assert other == controller
+    assert commands(other) == commands(controller)
 
 
 @pytest.mark.parametrize("name", STAGES)
@@ -121,32 +121,32 @@ def test_the_inverse_of_every_stage_comes_back(name: str) -> None:
 def test_the_state_and_filters_and_range_come_back() -> None:
     plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(5e-7,))
     last = plays.simulate(np.linspace(0.0, 20.0 * THIRD, 50), 1e-3).final
-    one = loop(
+    controller = loop(
         feedforward=plays.inverse(initial=last),
         filters=(pt.LowPass(100 * THIRD), pt.Notch(40 * THIRD, width=THIRD, depth=THIRD)),
         span=(-1e-4 * THIRD, 2e-4 * THIRD),
         max_jump=1e-5 * THIRD,
     )
-    assert back(one) == one
+    assert back(controller) == controller
     assert back(loop(max_jump=math.inf)).max_jump == math.inf
 
 
 def test_a_network_comes_back() -> None:
     network = pt.control.train_network(pt.datasets.dbo_training()[3.0:6.0], units=1, plays=1)
-    one = pt.Controller(dt=0.005, limits=(0.0, 3.6), feedforward=network, span=(-1e-3, 1e-3))
-    other = back(one)
+    controller = pt.Controller(dt=0.005, limits=(0.0, 3.6), feedforward=network, span=(-1e-3, 1e-3))
+    other = back(controller)
     assert isinstance(other.feedforward, pt.control.NetworkInverse)
-    assert commands(other) == commands(one)
+    assert commands(other) == commands(controller)
 
 
 @pytest.mark.parametrize(
     ("unit", "key"), [("V", "kp_V_per_m"), ("m", "kp_m_per_m"), ("N", "kp_N_per_m")]
 )
 def test_the_unit_of_the_drive_is_in_the_names(unit: str, key: str) -> None:
-    one = pt.Controller(
+    controller = pt.Controller(
         dt=1e-3, limits=(0.0, 1e-5), feedback=pt.Pid(kp=0.5, ti=0.1), drive_unit=unit
     )
-    assert back(one) == one
+    assert back(controller) == controller
     document = json.loads(Path("loop.json").read_text(encoding="utf-8"))
     assert document["feedback"][key] == 0.5
     assert document[f"limits_{unit}"] == [0.0, 1e-5]
@@ -157,9 +157,11 @@ def test_the_unit_of_the_drive_is_in_the_names(unit: str, key: str) -> None:
 
 def test_margins_at_design_are_kept() -> None:
     stage = pt.VirtualStage.xu_li_2010()
-    one = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.from_um(kp=0.05, ti=0.02))
-    report = pt.check_loop(stage, one)
-    other = pt.load_controller(one.save("loop.json", report=report))
+    controller = pt.Controller(
+        dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.from_um(kp=0.05, ti=0.02)
+    )
+    report = pt.check_loop(stage, controller)
+    other = pt.load_controller(controller.save("loop.json", report=report))
     assert other.provenance is not None
     design = other.provenance["design"]
     assert design["by"] == "check_loop"
@@ -172,7 +174,7 @@ def test_margins_at_design_are_kept() -> None:
     with pytest.raises(ParameterError, match="report is of another controller"):
         loop().save("other.json", report=report)
     with pytest.raises(ParameterError, match=r"report is .*: expected what"):
-        one.save("other.json", report=3)  # type: ignore[arg-type]
+        controller.save("other.json", report=3)  # type: ignore[arg-type]
     assert not Path("other.json").exists()
 
 
@@ -243,11 +245,11 @@ REFUSED: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_file_that_is_not_right_is_refused(name: str) -> None:
     change, sentence = REFUSED[name]
-    said = changed(change)
-    assert said.startswith("loop.json")
-    assert said.count("loop.json") == 1
-    assert sentence in said
-    assert "\n" not in said
+    message = changed(change)
+    assert message.startswith("loop.json")
+    assert message.count("loop.json") == 1
+    assert sentence in message
+    assert "\n" not in message
 
 
 def test_other_files_are_refused() -> None:

@@ -225,8 +225,8 @@ def test_the_square_root_is_rounded_as_that_of_the_library(tmp_path: Path) -> No
 @needs_gcc
 def test_a_bumpless_start_is_that_of_rust(tmp_path: Path) -> None:
     for name in ("PID", "sliding mode", "state space", "perturbation", "hysteresis observer"):
-        one = loop(name)
-        export(one, tmp_path, name="axis")
+        controller = loop(name)
+        export(controller, tmp_path, name="axis")
         program = """#include <stdio.h>
         #include <stdlib.h>
         #include "axis.h"
@@ -241,7 +241,7 @@ def test_a_bumpless_start_is_that_of_rust(tmp_path: Path) -> None:
         (tmp_path / "start.c").write_text(program)
         compiled(tmp_path, "start.c", "axis.c")
         done = subprocess.run(["./check"], cwd=tmp_path, capture_output=True, text=True, check=True)
-        session = one.start(present=33.0)
+        session = controller.start(present=33.0)
         rust = [session.step(5e-5, 4e-5 + 1e-7 * k, feedforward=1.0) for k in range(20)]
         assert [float.fromhex(word) for word in done.stdout.split()] == rust, name
 
@@ -318,17 +318,17 @@ def test_the_operations_are_those_that_are_printed(name: str, tmp_path: Path) ->
 
 def test_constants_are_exact(tmp_path: Path) -> None:
     export(loop("PID"), tmp_path, name="axis")
-    found = re.findall(
+    matches = re.findall(
         r"(-?0x[0-9a-f.]+p[+-]\d+)[,;] /\* (\S+) \*/", (tmp_path / "axis.c").read_text()
     )
-    assert len(found) > 8
-    for exact, decimal in found:
+    assert len(matches) > 8
+    for exact, decimal in matches:
         assert float.fromhex(exact) == float(decimal)
     export(loop("PID"), tmp_path, name="axis", single=True)
-    found = re.findall(
+    matches = re.findall(
         r"(-?0x[0-9a-f.]+p[+-]\d+)f[,;] /\* (\S+) \*/", (tmp_path / "axis.c").read_text()
     )
-    for exact, decimal in found:
+    for exact, decimal in matches:
         assert float.fromhex(exact) == float(np.float32(float(decimal)))
 
 
@@ -436,21 +436,23 @@ def test_what_has_no_form_is_refused(name: str, tmp_path: Path) -> None:
 
 
 def test_coefficients_without_their_feedforward_say_so(tmp_path: Path) -> None:
-    one = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=PLAYS.inverse(), feedback=PI)
-    said = str(export(one, tmp_path, to="json"))
+    controller = pt.Controller(
+        dt=0.02, limits=(0.0, 75.0), feedforward=PLAYS.inverse(), feedback=PI
+    )
+    said = str(export(controller, tmp_path, to="json"))
     assert said.startswith("coefficients; without the feedforward")
-    assert str(export(one, tmp_path, to="json", reference=SINE)) == "coefficients"
+    assert str(export(controller, tmp_path, to="json", reference=SINE)) == "coefficients"
 
 
 def test_the_biquads_and_matrices_are_those_of_the_step(tmp_path: Path) -> None:
     """A step of one's own from the coefficients follows the controller, unsaturated."""
-    one = pt.Controller(
+    controller = pt.Controller(
         dt=0.02, limits=(-1e3, 1e3), feedback=pt.Pid.xu_li_2010(), filters=[pt.Notch(10.0)]
     )
-    (path,) = export(one, tmp_path, to="json", name="axis").files
+    (path,) = export(controller, tmp_path, to="json", name="axis").files
     document = json.loads(path.read_text())
     assert path.name == "axis.json"
-    session = one.start()
+    session = controller.start()
     rng = np.random.default_rng(1)
     readings = 1e-6 * rng.standard_normal(60)
     volts = [session.step(0.0, float(y)) for y in readings]
@@ -458,11 +460,11 @@ def test_the_biquads_and_matrices_are_those_of_the_step(tmp_path: Path) -> None:
     # Both begin in the steady state of the first sample: from there on, the differences.
     filtered = filtered_by(notch, readings - readings[0]) + readings[0]
     error = -filtered
-    own = filtered_by(pid, error - error[0])
+    proportional = filtered_by(pid, error - error[0])
     steady = volts[0] + pid["b"][0] * 0.0
     integral = sum(pid["b"])
     assert np.allclose(
-        volts, own + steady + integral * error[0] * np.arange(60), rtol=0, atol=1e-12
+        volts, proportional + steady + integral * error[0] * np.arange(60), rtol=0, atol=1e-12
     )
     law = pt.control.LeadLag(kp=1e5, lead=0.05, lag=0.3)
     (path,) = export(

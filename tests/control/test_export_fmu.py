@@ -61,11 +61,11 @@ def test_the_description_is_valid(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["PID", "Dahl"])
 def test_its_commands_are_those_of_the_controller(name: str, tmp_path: Path) -> None:
-    one = loop(name)
-    path = unit_of(one, tmp_path)
+    controller = loop(name)
+    path = unit_of(controller, tmp_path)
     third = "next" if name == "Dahl" else "feedforward"
     unit, variables = slave(path)
-    session = one.start()
+    session = controller.start()
     signals = inputs([*("reference", "measured"), third])
     try:
         for k in range(200):
@@ -128,14 +128,14 @@ def test_a_table_needs_no_third_input(tmp_path: Path) -> None:
 
 
 def test_a_simulator_runs_it(tmp_path: Path) -> None:
-    one = loop("repetitive")
-    path = unit_of(one, tmp_path)
+    controller = loop("repetitive")
+    path = unit_of(controller, tmp_path)
     signals = inputs(["reference", "measured", "feedforward"])
     run = simulate_fmu(
         str(path), stop_time=3.0, step_size=DT, output_interval=DT, input=signals,
         output=["command"],
     )  # fmt: skip
-    session = one.start()
+    session = controller.start()
     volts = [
         session.step(float(signals["reference"][k]), float(signals["measured"][k]))
         for k in range(150)

@@ -25,27 +25,27 @@ def test_the_loop_is_stable_and_below_the_peak_at_every_gain(dt: float, bandwidt
     assert report.everywhere
     assert max(one.sensitivity for one in (report.low, report.middle, report.high)) < 2.0
     # The weight W1 is kept by gamma at every frequency, in the scale of the bilinear transform.
-    found = report.response()
-    s = 1j * np.tan(math.pi * found.frequency * dt)
+    response = report.response()
+    s = 1j * np.tan(math.pi * response.frequency * dt)
     edge = math.tan(math.pi * bandwidth * dt)
-    weighted = np.abs((s / 2.0 + edge) / (s + 1e-4 * edge) * found.sensitivity)
+    weighted = np.abs((s / 2.0 + edge) / (s + 1e-4 * edge) * response.sensitivity)
     assert weighted.max() <= 1.001 * law.gamma
-    assert np.abs(found.sensitivity[found.frequency < 0.5 * bandwidth]).max() < 0.71
+    assert np.abs(response.sensitivity[response.frequency < 0.5 * bandwidth]).max() < 0.71
 
 
 def test_the_effort_and_the_roll_off_are_kept() -> None:
     dt, gain = 2e-4, pt.check_loop(STAGE, pt.Controller(dt=1e-3, limits=LIMITS)).middle.gain
     law = mixed_sensitivity(STAGE, dt=dt, limits=LIMITS, bandwidth=20.0, effort=3.0, roll_off=100.0)
     loop = pt.Controller(dt=dt, limits=LIMITS, feedback=law)
-    found = pt.check_loop(STAGE, loop).response()
+    response = pt.check_loop(STAGE, loop).response()
     rows, b, c, d, _ = law._matrices
     a = np.reshape(rows, (len(b), len(b)))
-    z = np.exp(2j * math.pi * found.frequency * dt)
+    z = np.exp(2j * math.pi * response.frequency * dt)
     gains = [c @ np.linalg.solve(one * np.eye(len(b)) - a, b) + d for one in z]
-    effort = gain * np.abs(np.array(gains) * found.sensitivity)
+    effort = gain * np.abs(np.array(gains) * response.sensitivity)
     assert effort.max() <= 1.001 * 3.0 * law.gamma
-    beyond = found.frequency > 200.0
-    assert np.abs(found.complementary[beyond]).max() < 0.51 * law.gamma
+    beyond = response.frequency > 200.0
+    assert np.abs(response.complementary[beyond]).max() < 0.51 * law.gamma
 
 
 def test_it_follows_a_reference_on_the_stage_with_hysteresis() -> None:

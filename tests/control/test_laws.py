@@ -112,14 +112,14 @@ def test_the_estimate_takes_off_a_wrong_gain_of_the_plant_without_an_integrator(
 
 
 def test_a_thinner_boundary_layer_chatters_more() -> None:
-    found = []
+    chatters = []
     for layer in (20e-6, 2e-6):
         law = SlidingMode(switching=3.0, layer=layer)
         controller = loop(law, feedforward=INVERSE)
         run = pt.track(STAGE, controller, REFERENCE, unstable=True)
-        found.append(pt.control.chatter(run, after=5.0))
-    assert found[1].rms_change > 2.0 * found[0].rms_change
-    assert found[1].fast_share > found[0].fast_share
+        chatters.append(pt.control.chatter(run, after=5.0))
+    assert chatters[1].rms_change > 2.0 * chatters[0].rms_change
+    assert chatters[1].fast_share > chatters[0].fast_share
     with pytest.raises(pt.ParameterError, match="after is 100 s, which leaves 0 samples: expected"):
         pt.control.chatter(run, after=100.0)
 

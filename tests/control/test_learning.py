@@ -75,34 +75,34 @@ def test_the_distance_to_the_final_table_falls_by_the_factor_in_every_trial(
 ) -> None:
     reference = replace(SINE, duration=0.2 if method == "lifted" else 0.6, ramp=0.05, origin=0.0)
     stage = replace(LINEAR, frequency=frequency)
-    found = pt.learn(
+    learning = pt.learn(
         stage, reference, controller, model=LINEAR, method=method, trials=40, noise=0.0, settle=12
     )
-    tables = found.learner.tables
+    tables = learning.learner.tables
     distance = np.linalg.norm(tables[:-1] - tables[-1], axis=1)
     falling = distance[: np.argmax(distance < 1e-5 * distance[0]) or None]
     assert falling.size > 3
-    assert found.convergence.factor < 0.91
+    assert learning.convergence.factor < 0.91
     # The reference is the last table, which is a trial's share of the distance off.
-    assert np.all(falling[1:] <= (found.convergence.factor + 1e-3) * falling[:-1])
-    best = found.learner.best
-    assert np.all(np.diff(found.errors[: best + 1]) <= 0.0)
+    assert np.all(falling[1:] <= (learning.convergence.factor + 1e-3) * falling[:-1])
+    best = learning.learner.best
+    assert np.all(np.diff(learning.errors[: best + 1]) <= 0.0)
 
 
 def test_a_sine_on_a_stage_with_hysteresis_ends_at_the_noise() -> None:
     stage = pt.VirtualStage.of(PLAYS, noise=10e-9, seed=3)
     loop = replace(OPEN, feedforward=replace(PLAYS, linear=0.9e-6).inverse())
     slow = pt.sine(frequency=5.0, low=10e-6, high=50e-6, duration=1.0)
-    found = pt.learn(stage, slow, loop, model=PLAYS, settle=4, mode_scales=1.0)
-    assert found.stopped == "noise"
-    assert found.errors[0] > 1e-6
+    learning = pt.learn(stage, slow, loop, model=PLAYS, settle=4, mode_scales=1.0)
+    assert learning.stopped == "noise"
+    assert learning.errors[0] > 1e-6
     # The mean of two records of 10 nm, and at gain 0.7 half as much again of earlier trials.
-    assert found.errors[found.best] < 1.4 * 10e-9 / math.sqrt(2.0)
+    assert learning.errors[learning.best] < 1.4 * 10e-9 / math.sqrt(2.0)
     again = replace(stage, sensor=replace(stage.sensor, seed=999))
-    played = found.learner.tables[found.best]
+    played = learning.learner.tables[learning.best]
     motion = again.simulate(np.tile(played, 8), DT, hold="zoh").x[-200:]
     # What was learnt is not the noise of its trials: the true motion follows as well.
-    assert np.sqrt(np.mean((motion - found.learner.desired) ** 2)) < 10e-9
+    assert np.sqrt(np.mean((motion - learning.learner.desired) ** 2)) < 10e-9
 
 
 def test_the_error_falls_monotonically_with_hysteresis_creep_and_a_lower_mode() -> None:
@@ -156,16 +156,16 @@ def test_the_refusal_is_right_on_the_stage_that_it_names() -> None:
 def test_the_table_stays_within_the_limits_and_does_not_wind_up() -> None:
     loop = replace(OPEN, limits=(0.0, 40.0))
     stage = replace(LINEAR, linear=1e-6)
-    found = pt.learn(stage, SINE, loop, trials=60, beyond_reach=True, noise=0.0)
-    assert found.stopped != "grows"
-    assert found.tables.min() >= 0.0
-    assert found.tables.max() <= 40.0
+    learning = pt.learn(stage, SINE, loop, trials=60, beyond_reach=True, noise=0.0)
+    assert learning.stopped != "grows"
+    assert learning.tables.min() >= 0.0
+    assert learning.tables.max() <= 40.0
     # Where the table is at its limit, and two delays around it, nothing better is possible.
-    reachable = found.learner.desired < 35e-6
-    error = found.final.error[-100:]
+    reachable = learning.learner.desired < 35e-6
+    error = learning.final.error[-100:]
     assert np.abs(error[reachable]).max() < 0.1 * np.abs(error).max()
     # A lower reference is followed at once: nothing was stored beyond the limits.
-    learner = found.learner
+    learner = learning.learner
     within = learner.desired - np.minimum(learner.desired, 30e-6)
     settled = learner.update(learner.desired + within)
     assert settled.max() < 40.0
@@ -187,10 +187,10 @@ def test_what_does_not_repeat_is_forgotten_and_what_is_known_as_noise_ends_it() 
 def test_a_growing_error_ends_it_with_the_best_table() -> None:
     # A model without the mode of the stage: nothing can show that before the first trial.
     rigid = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(), weights=())
-    found = pt.learn(replace(LINEAR, frequency=60.0), SINE, OPEN, model=rigid, noise=0.0)
-    assert found.stopped == "grows"
-    assert found.best < len(found.trials) - 1
-    assert np.array_equal(found.table, found.tables[found.best])
+    learning = pt.learn(replace(LINEAR, frequency=60.0), SINE, OPEN, model=rigid, noise=0.0)
+    assert learning.stopped == "grows"
+    assert learning.best < len(learning.trials) - 1
+    assert np.array_equal(learning.table, learning.tables[learning.best])
 
 
 def test_records_of_several_periods_show_what_does_not_repeat() -> None:
@@ -262,14 +262,14 @@ def test_references_and_controllers_that_cannot_be_learnt_with() -> None:
 
 
 def test_the_table_is_saved_with_its_units(tmp_path: Path) -> None:
-    found = pt.learn(LINEAR, SINE, OPEN, trials=3, noise=0.0)
-    path = found.save(tmp_path / "table.csv")
+    learning = pt.learn(LINEAR, SINE, OPEN, trials=3, noise=0.0)
+    path = learning.save(tmp_path / "table.csv")
     assert path.read_text().splitlines()[0] == "time_s,desired_um,voltage_V,feedforward_V"
     rows = np.loadtxt(path, delimiter=",", skiprows=1)
-    assert rows[:, 2] == pytest.approx(found.table, abs=1e-8)
-    assert rows[:, 1] == pytest.approx(1e6 * found.learner.desired, abs=1e-8)
-    assert "trial" in found.summary()
-    assert len(found.plot().axes) == 3
+    assert rows[:, 2] == pytest.approx(learning.table, abs=1e-8)
+    assert rows[:, 1] == pytest.approx(1e6 * learning.learner.desired, abs=1e-8)
+    assert "trial" in learning.summary()
+    assert len(learning.plot().axes) == 3
 
 
 def test_a_trial_has_the_timing_of_its_loop() -> None:

@@ -104,11 +104,11 @@ def test_without_python_control_it_says_so(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_a_controller_of_a_model_has_its_range_and_its_interval() -> None:
     fit = pt.identify(pt.datasets.dbo_training()[3.0:23.0], "prandtl-ishlinskii")
-    one = pt.Controller.of(fit, feedback=PID)
-    assert (one.dt, one.limits) == (0.005, fit.drive_range)
-    assert one.feedback is PID
-    assert one.feedforward is not None
-    assert one.feedforward.offset == fit.offset
+    controller = pt.Controller.of(fit, feedback=PID)
+    assert (controller.dt, controller.limits) == (0.005, fit.drive_range)
+    assert controller.feedback is PID
+    assert controller.feedforward is not None
+    assert controller.feedforward.offset == fit.offset
     other = pt.Controller.of(fit, dt=0.01, limits=(0.0, 2.0))
     assert (other.dt, other.limits) == (0.01, (0.0, 2.0))
     bare = replace(fit, details={})
@@ -145,11 +145,11 @@ def test_a_stage_that_never_sees_0_volts_begins_at_its_nearest_limit() -> None:
         frequency=0.5, low=-70e-6, high=-35e-6, duration=4.0))  # fmt: skip
     assert low.measured[0] == pytest.approx(-30e-6)
     both = pt.XYStage(x=stage, y=stage)
-    found = pt.control.workspace(both, (20.0, 60.0))
-    assert found.x == pytest.approx((30e-6, 90e-6))
-    assert found.centre == pytest.approx((60e-6, 60e-6))
-    assert found.rest == pytest.approx((30e-6, 30e-6))
-    path = pt.circle(frequency=0.5, radius=5e-6, centre=found.centre, origin=found.rest)
+    space = pt.control.workspace(both, (20.0, 60.0))
+    assert space.x == pytest.approx((30e-6, 90e-6))
+    assert space.centre == pytest.approx((60e-6, 60e-6))
+    assert space.rest == pytest.approx((30e-6, 30e-6))
+    path = pt.circle(frequency=0.5, radius=5e-6, centre=space.centre, origin=space.rest)
     one = loop(limits=(20.0, 60.0))
     run_of_both = pt.contour(both, (one, one), path)
     assert run_of_both.y.measured[0] == pytest.approx(30e-6)

@@ -35,16 +35,19 @@ def network() -> pt.control.NetworkInverse:
 
 def test_the_jacobian_is_the_derivative() -> None:
     generator = np.random.default_rng(0)
-    one = _Network(
+    network = _Network(
         0.0, np.ones(3), np.arange(1, 3) / 3, 3, generator.normal(size=3 * 5 + 3 + 3 + 6)
     )
     inputs, step = generator.normal(size=(9, 5)), 1e-6
     numeric = [
-        (one.output(one.weights + step * e, inputs) - one.output(one.weights - step * e, inputs))
+        (
+            network.output(network.weights + step * e, inputs)
+            - network.output(network.weights - step * e, inputs)
+        )
         / (2.0 * step)
-        for e in np.eye(one.weights.size)
+        for e in np.eye(network.weights.size)
     ]
-    assert np.abs(one.jacobian(inputs) - np.transpose(numeric)).max() < 1e-8
+    assert np.abs(network.jacobian(inputs) - np.transpose(numeric)).max() < 1e-8
 
 
 def test_it_follows_another_motion_than_it_was_trained_on(network: Any) -> None:
@@ -102,12 +105,12 @@ def test_what_rust_runs_is_what_was_trained(network: Any) -> None:
 
 def test_the_same_seed_gives_the_same_network_and_noise_does_not_break_it() -> None:
     log = record(2, noise=20e-9)
-    one, same, other = (train_network(log[1.0:], units=3, seed=seed) for seed in (1, 1, 2))
-    assert one.numbers == same.numbers
-    assert one.numbers != other.numbers
-    assert one.held_out < 0.02 * 75.0
+    first, same, other = (train_network(log[1.0:], units=3, seed=seed) for seed in (1, 1, 2))
+    assert first.numbers == same.numbers
+    assert first.numbers != other.numbers
+    assert first.held_out < 0.02 * 75.0
     # The part held out decides: it is not far worse than the part that was trained on.
-    assert one.held_out < 3.0 * one.trained
+    assert first.held_out < 3.0 * first.trained
 
 
 @pytest.mark.parametrize(

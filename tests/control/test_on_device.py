@@ -126,11 +126,11 @@ def test_a_learning_that_ends_early_ends_at_rest_and_has_what_was_learnt(
         pt.learn(device, reference, feedforward(), model=stage(mode=(310.0, 0.1)), rest=3.0)
     assert device.held == 3.0
     assert signal.getsignal(signal.SIGTERM) is before
-    found = caught.value.partial
-    assert (len(found.trials), found.best, found.stopped) == (2, 1, "interrupted")
-    assert found.tables.shape == (2, 200)
-    assert found.errors[1] < 0.6 * found.errors[0]
-    assert found.final.metrics.rms_error < found.first.metrics.rms_error
+    learning = caught.value.partial
+    assert (len(learning.trials), learning.best, learning.stopped) == (2, 1, "interrupted")
+    assert learning.tables.shape == (2, 200)
+    assert learning.errors[1] < 0.6 * learning.errors[0]
+    assert learning.final.metrics.rms_error < learning.first.metrics.rms_error
 
 
 @pytest.mark.parametrize(

@@ -31,23 +31,23 @@ STAGES = {"dahl": pt.DahlStage.xu_li_2010(), "bouc-wen": pt.BoucWenStage.xu_li_2
 SIZES = {"V/m": 1e5, "m/V": 1.5e-6, "V": 3.0, "m": 2e-5, "s": 0.3, "Hz": 5.0, "": 0.5}
 
 
-def value_of(law: str, one: Number) -> Any:
-    match one.form:
+def value_of(law: str, number: Number) -> Any:
+    match number.form:
         case "part":
-            return made(one.choices[0])
+            return made(number.choices[0])
         case "parts":
-            return [made(one.choices[0])]
+            return [made(number.choices[0])]
         case "stage":
-            return STAGES[one.choices[0]]
+            return STAGES[number.choices[0]]
         case "word":
-            return one.choices[-1]
+            return number.choices[-1]
         case "count":
             return 3
         case "truth":
             return True
         case "numbers" | "matrix":
-            return LISTS[law].get(one.name)
-    return SIZES[one.unit]
+            return LISTS[law].get(number.name)
+    return SIZES[number.unit]
 
 
 def made(name: str) -> Any:
@@ -67,14 +67,16 @@ def test_the_class_of_a_part_has_the_numbers_and_defaults_of_the_core(name: str)
     info, kind = LISTED[name], part_class(name)
     assert issubclass(kind, FeedbackLaw if info.role == "law" else Part)
     assert kind.info is info
-    own = {one.name: one for one in fields(kind)}
-    assert own.keys() == {one.name for one in info.numbers}
-    for one in info.numbers:
-        default = own[one.name].default
-        if one.default is not None:
-            expected = one.choices[int(one.default)] if one.form == "word" else one.default
+    attributes = {one.name: one for one in fields(kind)}
+    assert attributes.keys() == {one.name for one in info.numbers}
+    for number in info.numbers:
+        default = attributes[number.name].default
+        if number.default is not None:
+            expected = (
+                number.choices[int(number.default)] if number.form == "word" else number.default
+            )
             assert default == expected
-        elif one.is_optional:
+        elif number.is_optional:
             assert default is None or isinstance(default, Part)
         else:
             assert default is MISSING

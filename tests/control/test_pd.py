@@ -32,12 +32,12 @@ def steps() -> pt.Reference:
 
 
 def tuned(model: pt.stages.PrandtlIshlinskiiStage) -> pt.Controller:
-    found = pt.tune(
+    tuned = pt.tune(
         stage(), steps(), dt=DT, limits=LIMITS, feedforward=model.inverse(), **QUICK
     ).controller
-    assert isinstance(found.feedback, pt.Pid)
-    assert math.isinf(found.feedback.ti)
-    return found
+    assert isinstance(tuned.feedback, pt.Pid)
+    assert math.isinf(tuned.feedback.ti)
+    return tuned
 
 
 def at_rest(controller: pt.Controller) -> tuple[Any, Any]:
@@ -75,12 +75,12 @@ def test_with_the_inverse_of_the_stage_nothing_is_left_and_without_it_most_of_th
 
 def test_its_margins_hold_for_the_gain_of_the_whole_set() -> None:
     spread = pt.Spread(gain=0.3)
-    found = pt.tune(
+    result = pt.tune(
         stage(), steps(), dt=DT, limits=LIMITS, feedforward=stage(1.1 * GAIN).inverse(),
         spread=spread, **QUICK,
     )  # fmt: skip
-    assert max(one.share for one in found.kept) <= 1.01
-    calm = found.controller
+    assert max(one.share for one in result.kept) <= 1.01
+    calm = result.controller
     free = tuned(stage(1.1 * GAIN))
     assert isinstance(calm.feedback, pt.Pid)
     assert isinstance(free.feedback, pt.Pid)

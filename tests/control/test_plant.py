@@ -226,12 +226,12 @@ def test_a_repetitive_loop_prints_its_own_margin() -> None:
         static = pt.PrandtlIshlinskiiStage(linear=gain, thresholds=(), weights=())
         return pt.check_loop(static, loop(feedback=feedback, repetitive=learning)).middle
 
-    found = check(1.3e-6)
-    assert found.gain_margin == pytest.approx(10.26, rel=1e-3)
-    assert found.stable_gains is not None
-    factor = found.stable_gains[1]
+    report = check(1.3e-6)
+    assert report.gain_margin == pytest.approx(10.26, rel=1e-3)
+    assert report.stable_gains is not None
+    factor = report.stable_gains[1]
     assert factor < 1.0
-    assert str(found) == f"1.3 um/V: UNSTABLE, gain margin {factor:.3g}"
+    assert str(report) == f"1.3 um/V: UNSTABLE, gain margin {factor:.3g}"
     # At that gain the loop is at its limit.
     assert check(0.99 * factor * 1.3e-6).stable
     assert "Ms of the feedback" in str(check(0.99 * factor * 1.3e-6))

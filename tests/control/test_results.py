@@ -64,11 +64,11 @@ def test_a_learning_is_a_document_of_its_trials() -> None:
     reference = pt.triangle(frequency=10.0, low=10e-6, high=50e-6, duration=0.5)
     loop = pt.Controller(dt=1e-3, limits=(0.0, 75.0), feedforward=PLAYS.inverse())
     stage = pt.VirtualStage.of(PLAYS, noise=5e-9, mode=(160.0, 0.065))
-    found = pt.learn(stage, reference, loop, model=stage, mode_scales=1.0, trials=3)
-    document = plain(found.document())
-    assert [trial["rms_error"] for trial in document["trials"]] == list(found.errors)
-    assert document["best"] == found.best == int(np.argmin(found.errors))
-    assert document["convergence"]["factor"] == found.convergence.factor < 1.0
+    learning = pt.learn(stage, reference, loop, model=stage, mode_scales=1.0, trials=3)
+    document = plain(learning.document())
+    assert [trial["rms_error"] for trial in document["trials"]] == list(learning.errors)
+    assert document["best"] == learning.best == int(np.argmin(learning.errors))
+    assert document["convergence"]["factor"] == learning.convergence.factor < 1.0
 
 
 def test_a_report_has_its_margins_as_numbers_for_the_file_of_its_controller() -> None:
@@ -119,20 +119,20 @@ def test_a_tuning_without_references_is_drawn_in_the_unit_of_its_value() -> None
 def test_a_schedule_is_its_grid(tmp_path: Path) -> None:
     grid: tuple[Any, Any] = ([5e-6, 20e-6], [0.5, 1.0, 2.0])
     options: Any = {"dt": 0.01, "limits": (0.0, 75.0), "parts": "pid", "search": QUICK}
-    found = pt.schedule(PLAYS, *grid, centre=40e-6, **options)
-    table = found.table
-    law: Any = found.controller.feedback
+    schedule = pt.schedule(PLAYS, *grid, centre=40e-6, **options)
+    table = schedule.table
+    law: Any = schedule.controller.feedback
     assert table["kp_V_per_m"].tolist() == [one.kp for one in law.gains]
     places = zip(table["amplitude_m"], table["rate_Hz"], strict=True)
     assert list(places) == [(amplitude, rate) for amplitude in grid[0] for rate in grid[1]]
-    assert found.errors[1, 2, 1] == table["scheduled_rms_m"][5]
-    assert found.to_frame()["ti_s"].tolist() == [one.ti for one in law.gains]
-    files = {file.name: file for file in found.save(tmp_path)}
+    assert schedule.errors[1, 2, 1] == table["scheduled_rms_m"][5]
+    assert schedule.to_frame()["ti_s"].tolist() == [one.ti for one in law.gains]
+    files = {file.name: file for file in schedule.save(tmp_path)}
     assert set(files) == {"schedule.csv", "schedule.json", "schedule.png", "schedule.svg"}
-    assert json.loads(files["schedule.json"].read_text()) == plain(found.document())
-    (ax,) = found.plot(fig=Figure()).axes
+    assert json.loads(files["schedule.json"].read_text()) == plain(schedule.document())
+    (ax,) = schedule.plot(fig=Figure()).axes
     drawn = np.array([line.get_ydata() for line in ax.lines], float)
-    np.testing.assert_allclose(drawn, 1e6 * np.moveaxis(found.errors, 2, 1).reshape(4, 3))
+    np.testing.assert_allclose(drawn, 1e6 * np.moveaxis(schedule.errors, 2, 1).reshape(4, 3))
 
 
 def test_panels_are_drawn_in_the_axes_given() -> None:

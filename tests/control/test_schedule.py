@@ -27,13 +27,13 @@ def motion(amplitude: float, rate: float, periods: float = 4.0) -> pt.Reference:
 
 
 @cache
-def found() -> Schedule:
+def whole_schedule() -> Schedule:
     stage = pt.VirtualStage.xu_li_2010(seed=1)
     return pt.schedule(stage, AMPLITUDES, RATES, centre=CENTRE, **FULL)
 
 
 def law() -> ScheduledPid:
-    feedback = found().controller.feedback
+    feedback = whole_schedule().controller.feedback
     assert isinstance(feedback, ScheduledPid)
     return feedback
 
@@ -55,8 +55,8 @@ def test_better_in_the_sum_and_nowhere_worse_than_the_noise_explains() -> None:
         for rate in RATES:
             reference = motion(amplitude, rate)
             own = replace(law(), first=(amplitude, rate))
-            scheduled = errors(replace(found().controller, feedback=own), reference)
-            fixed = errors(found().fixed.controller, reference)
+            scheduled = errors(replace(whole_schedule().controller, feedback=own), reference)
+            fixed = errors(whole_schedule().fixed.controller, reference)
             assert scheduled.mean() < fixed.mean() + 2.0 * fixed.std(ddof=1)
             sums += fixed.mean(), scheduled.mean()
     assert sums[1] < 0.95 * sums[0]
@@ -64,16 +64,20 @@ def test_better_in_the_sum_and_nowhere_worse_than_the_noise_explains() -> None:
 
 @pytest.mark.slow
 def test_the_table_is_that_of_the_runs() -> None:
-    table = found().errors
+    table = whole_schedule().errors
     assert table.shape == (2, 2, 2)
     assert (table[..., 1] <= table[..., 0]).all()
-    runs = found().fixed.runs
+    runs = whole_schedule().fixed.runs
     assert table[..., 0].ravel() == pytest.approx([one.metrics.rms_error for one in runs])
     # At a place of the grid, the controller is that of the gains found there.
-    one = replace(found().controller, feedback=replace(law(), first=(AMPLITUDES[0], RATES[1])))
-    alone = pt.track(pt.VirtualStage.xu_li_2010(seed=1), one, motion(AMPLITUDES[0], RATES[1]))
+    controller = replace(
+        whole_schedule().controller, feedback=replace(law(), first=(AMPLITUDES[0], RATES[1]))
+    )
+    alone = pt.track(
+        pt.VirtualStage.xu_li_2010(seed=1), controller, motion(AMPLITUDES[0], RATES[1])
+    )
     assert table[0, 1, 1] == pytest.approx(alone.metrics.rms_error, rel=0.05)
-    text = str(found()).splitlines()
+    text = str(whole_schedule()).splitlines()
     assert len(text) == 5
     assert text[1].split()[:2] == ["10", "0.2"]
 
@@ -81,11 +85,11 @@ def test_the_table_is_that_of_the_runs() -> None:
 def test_the_margins_hold_at_every_place() -> None:
     stage = pt.VirtualStage.xu_li_2010(seed=1)
     for gains in law().gains:
-        loops = pt.check_loop(stage, replace(found().controller, feedback=gains))
-        for one in (loops.low, loops.middle, loops.high):
-            assert one.stable
-            assert one.sensitivity <= 2.0 * 1.01
-            assert (one.gain_margin or np.inf) >= 2.0 * 0.99
+        loops = pt.check_loop(stage, replace(whole_schedule().controller, feedback=gains))
+        for margin in (loops.low, loops.middle, loops.high):
+            assert margin.stable
+            assert margin.sensitivity <= 2.0 * 1.01
+            assert (margin.gain_margin or np.inf) >= 2.0 * 0.99
 
 
 def test_a_change_of_gains_does_not_bump_the_voltage() -> None:

@@ -67,11 +67,11 @@ def desired(k: int, height: float = 60e-6) -> float:
 
 
 def errors(session: pt.control.Session, plant: Plant, samples: range) -> list[float]:
-    found = []
+    distances = []
     for k in samples:
-        found.append(abs(desired(k) - plant.x))
+        distances.append(abs(desired(k) - plant.x))
         plant(session.step(desired(k), plant.x))
-    return found
+    return distances
 
 
 # Readings that are none.

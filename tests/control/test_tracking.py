@@ -90,11 +90,11 @@ def test_the_same_seed_gives_the_same_bits_and_another_other_noise() -> None:
         stage = pt.VirtualStage.xu_li_2010(seed=seed)
         return pt.track(stage, loop(feedback=PID), sine(0.5, 4.0))
 
-    one, again, other = run(1), run(1), run(2)
+    first, again, other = run(1), run(1), run(2)
     for name in ("measured", "voltage", "fine_displacement"):
-        assert getattr(one, name).tobytes() == getattr(again, name).tobytes()
-        assert getattr(one, name).tobytes() != getattr(other, name).tobytes()
-    assert one.metrics.rms_error == pytest.approx(other.metrics.rms_error, rel=0.05)
+        assert getattr(first, name).tobytes() == getattr(again, name).tobytes()
+        assert getattr(first, name).tobytes() != getattr(other, name).tobytes()
+    assert first.metrics.rms_error == pytest.approx(other.metrics.rms_error, rel=0.05)
 
 
 # Other stages, delay, jitter.
@@ -170,10 +170,12 @@ def test_a_delay_in_the_loop_is_a_delay_of_the_motion() -> None:
 
 
 def test_substeps_change_what_is_kept_and_not_the_run() -> None:
-    one, many = (pt.track(STAGE, loop(feedback=PID), sine(0.5, 2.0), substeps=n) for n in (1, 20))
-    assert one.fine_t.size == 100
+    coarse, many = (
+        pt.track(STAGE, loop(feedback=PID), sine(0.5, 2.0), substeps=n) for n in (1, 20)
+    )
+    assert coarse.fine_t.size == 100
     assert many.fine_t.size == 99 * 20 + 1
-    assert np.abs(one.measured - many.measured).max() < 0.2 * UM
+    assert np.abs(coarse.measured - many.measured).max() < 0.2 * UM
 
 
 # What is refused.

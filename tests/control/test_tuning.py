@@ -45,11 +45,11 @@ def test_tuned_gains_beat_the_published_ones_with_more_margin() -> None:
         after = pt.track(other, tuned.controller, reference).metrics
         assert after.rms_error < 0.8 * before.rms_error
     loops = pt.check_loop(stage, tuned.controller)
-    for one in (loops.low, loops.middle, loops.high):
-        assert one.stable
-        assert one.sensitivity <= 2.0 * 1.01
-        assert one.gain_margin is not None
-        assert one.gain_margin >= 2.0 * 0.99
+    for margin in (loops.low, loops.middle, loops.high):
+        assert margin.stable
+        assert margin.sensitivity <= 2.0 * 1.01
+        assert margin.gain_margin is not None
+        assert margin.gain_margin >= 2.0 * 0.99
     before_margin = pt.check_loop(stage, published).high.gain_margin
     assert before_margin is not None
     assert before_margin < 2.0
@@ -113,11 +113,11 @@ def test_the_fastest_of_the_allowed_sampling_rates_wins_on_a_clean_stage() -> No
 
 def test_the_same_bits_for_any_number_of_threads() -> None:
     stage, reference = published_stage(), motion(7.5)
-    found = [
+    tuned = [
         pt.tune(stage, reference, dt=0.02, limits=LIMITS, threads=threads, **QUICK).controller
         for threads in (1, 2)
     ]
-    assert found[0] == found[1]
+    assert tuned[0] == tuned[1]
 
 
 def test_less_effort_where_it_costs() -> None:
@@ -264,10 +264,10 @@ def test_a_delay_beyond_the_memory_of_a_search_is_refused() -> None:
 
 
 def test_plants_of_both_signs_are_refused() -> None:
-    one = pt.stages.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(10.0,), weights=(0.2e-6,))
+    rising = pt.stages.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(10.0,), weights=(0.2e-6,))
     other = pt.stages.PrandtlIshlinskiiStage(linear=-1e-6, thresholds=(10.0,), weights=(-0.2e-6,))
     with pytest.raises(pt.ParameterError, match="all of one sign"):
-        pt.tune([one, other], dt=1e-3, limits=LIMITS, parts="pid", **QUICK)
+        pt.tune([rising, other], dt=1e-3, limits=LIMITS, parts="pid", **QUICK)
 
 
 @pytest.mark.parametrize(

@@ -119,30 +119,32 @@ def test_the_same_bits_for_any_number_of_threads() -> None:
         "parts": "pid",
         "search": pt.TuningSearch(particles=12, iterations=4),
     }
-    one, three = (
+    single, three = (
         pt.tune(pt.XYStage.xu_li_2010(seed=1), path, threads=threads, **options)
         for threads in (1, 3)
     )
-    assert one.controllers == three.controllers
-    assert np.array_equal(one.history, three.history)
+    assert single.controllers == three.controllers
+    assert np.array_equal(single.history, three.history)
 
 
 def test_scheduled_gains_of_both_axes_follow_the_contour() -> None:
     stage, grid = pt.XYStage.xu_li_2010(seed=1), ([10e-6, 40e-6], [0.5])
-    found = pt.schedule(stage, *grid, **LOOP, search=pt.TuningSearch(particles=16, iterations=12))
-    assert len(found.controllers) == 2
-    assert found.errors.shape == (2, 1, 2)
-    assert (found.errors[..., 1] <= found.errors[..., 0]).all()
-    for radius, (fixed, after) in zip(grid[0], found.errors[:, 0], strict=True):
+    schedule = pt.schedule(
+        stage, *grid, **LOOP, search=pt.TuningSearch(particles=16, iterations=12)
+    )
+    assert len(schedule.controllers) == 2
+    assert schedule.errors.shape == (2, 1, 2)
+    assert (schedule.errors[..., 1] <= schedule.errors[..., 0]).all()
+    for radius, (fixed, after) in zip(grid[0], schedule.errors[:, 0], strict=True):
         path = pt.circle(frequency=0.5, radius=radius)
         pair = tuple(
             replace(one, feedback=replace(one.feedback, first=(radius, 0.5)))  # type: ignore[type-var]
-            for one in found.controllers
+            for one in schedule.controllers
         )
         run = pt.contour(stage, pair, path)
         assert run.metrics.rms_error == pytest.approx(after, rel=0.02)
         assert run.metrics.rms_error < 1.02 * fixed
-    assert str(found).count("rms um: fixed, scheduled") == 2
+    assert str(schedule).count("rms um: fixed, scheduled") == 2
 
 
 def test_filters_of_each_axis() -> None:

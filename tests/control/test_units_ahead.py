@@ -37,13 +37,13 @@ def session() -> pt.control.Session:
 def test_another_unit_is_refused_before_it_reaches_the_stage(
     given: dict[str, Any], message: str
 ) -> None:
-    one, same = session(), session()
-    one.step(20e-6, 19e-6)
+    tried, same = session(), session()
+    tried.step(20e-6, 19e-6)
     same.step(20e-6, 19e-6)
     with pytest.raises(pt.ParameterError, match=message):
-        one.step(20e-6, 20e-6, **given)
+        tried.step(20e-6, 20e-6, **given)
     # Nothing has changed.
-    assert one.step(21e-6, 20e-6) == same.step(21e-6, 20e-6)
+    assert tried.step(21e-6, 20e-6) == same.step(21e-6, 20e-6)
 
 
 def test_what_a_stage_can_have_goes_through() -> None:

@@ -65,11 +65,11 @@ def test_a_sensor_that_is_not_connected_is_named(noise: float) -> None:
 
 def test_a_motion_by_another_input_is_named() -> None:
     tones = [np.sin(2.0 * np.pi * f * T + f * f) for f in np.arange(1.0, 60.0, 1.3)]
-    own, other = np.sum(tones[::2], axis=0), np.sum(tones[1::2], axis=0)
-    found = unusual_connection(own, 1e-6 * resonant(other, 0.1, 0.05))
+    drive, other = np.sum(tones[::2], axis=0), np.sum(tones[1::2], axis=0)
+    found = unusual_connection(drive, 1e-6 * resonant(other, 0.1, 0.05))
     assert found is not None
     assert "another input" in found.note
-    assert unusual_connection(own, 1e-6 * resonant(own, 0.1, 0.05)) is None
+    assert unusual_connection(drive, 1e-6 * resonant(drive, 0.1, 0.05)) is None
 
 
 @pytest.mark.parametrize("frequency", [0.01, 0.02, 0.1, 0.3])

@@ -134,7 +134,7 @@ def _of_columns(kind: Kind) -> list[Case]:
     def lost(values: Any) -> Any:
         return np.where(np.arange(values.size) == 7, np.nan, values)
 
-    found = [
+    cases = [
         case("a column without a unit", {**LOG, "voltage": (U, "")}),
         case("a unit that is not known", {**LOG, "position": (Y, "inch")}),
         case("a unit of another quantity", {**LOG, "position": (Y, "mV")}),
@@ -144,16 +144,16 @@ def _of_columns(kind: Kind) -> list[Case]:
         case("two samples", {name: (one[:2], unit) for name, (one, unit) in LOG.items()}),
     ]
     if kind.name in TIMELESS:
-        found.insert(5, case("no time and no rate", _without(LOG, "time"), **TIMELESS[kind.name]))
+        cases.insert(5, case("no time and no rate", _without(LOG, "time"), **TIMELESS[kind.name]))
     if kind.timed:
-        found += [
+        cases += [
             case("a gap in the times", {**LOG, "time": (_late(T), "s")}),
             case("two rates in one column of times", {**LOG, "time": (_two_rates(), "s")}),
             case("times that go back", {**LOG, "time": (T % 1.0, "s")}),
         ]
     if kind.name in ("NPZ", "MAT v5 and v7", "MAT v7.3", "HDF5"):
-        found.append(case("columns of two rates", {**LOG, "position": (Y[::2], "um")}))
-    return found
+        cases.append(case("columns of two rates", {**LOG, "position": (Y[::2], "um")}))
+    return cases
 
 
 # How a format is written without time and rate.
@@ -203,17 +203,17 @@ def _of_bytes(kind: Kind) -> list[Case]:
         path.write_bytes(b"time_s,voltage_V,x_um\n0,1,2\n1,2,3\n2,1,2\n")
 
     file = "curve.jpk-force" if kind.library == "afmformats" else kind.file
-    found = [Case("an empty file", lambda path: path.write_bytes(b""), file)]
+    cases = [Case("an empty file", lambda path: path.write_bytes(b""), file)]
     if kind.library != "afmformats":
-        found.insert(0, Case("a file that is cut off", cut))
+        cases.insert(0, Case("a file that is cut off", cut))
     if kind.file.endswith((".csv", ".tab")):
-        return found
-    return [*found, Case("a text with the ending of the format", other, file)]
+        return cases
+    return [*cases, Case("a text with the ending of the format", other, file)]
 
 
 def _changed(kind: str, change: Callable[[bytes], bytes]) -> Make:
     """A sound file with some of its bytes changed."""
-    (one,) = [one for one in KINDS if one.name == kind]
+    (one,) = [kind_of_log for kind_of_log in KINDS if kind_of_log.name == kind]
 
     def make(path: Path) -> None:
         _sound(one, path)

@@ -40,21 +40,21 @@ def use_path(path: str) -> Any:
 
 def use_model(path: str) -> Any:
     """Follow a drive and a reference with a model, and save it: it has to be the same again."""
-    found = pt.load(path)
+    loaded = pt.load(path)
     results = []
     for use in (
-        lambda: found.displacement(VOLTS, 0.02),
-        lambda: found.inverse().voltage(SINE, 0.02),
-        lambda: found.drive_range,
+        lambda: loaded.displacement(VOLTS, 0.02),
+        lambda: loaded.inverse().voltage(SINE, 0.02),
+        lambda: loaded.drive_range,
     ):
         try:
             results.append(use())
         except pt.PiezotrackError:
             results.append(None)
-    found.save("again.json")
+    loaded.save("again.json")
     again = pt.load("again.json")
-    assert again.model == found.model
-    assert (again.offset, again.delay) == (found.offset, found.delay)
+    assert again.model == loaded.model
+    assert (again.offset, again.delay) == (loaded.offset, loaded.delay)
     return results
 
 

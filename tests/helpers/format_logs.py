@@ -66,15 +66,15 @@ def survives(path: Path, seed: int = 1) -> int:
     for content in damaged(path.read_bytes(), seed):
         copy.write_bytes(content)
         began = time.process_time()
-        said = f"{copy.name}:"
+        message = f"{copy.name}:"
         try:
             log = pt.read(copy)
             assert np.isfinite(log.u).all()
             assert np.isfinite(log.y).all()
         except pt.PiezotrackError as error:
             refused += 1
-            said = str(error)
-        assert said.startswith(f"{copy.name}:")
-        assert len(said) < 500
+            message = str(error)
+        assert message.startswith(f"{copy.name}:")
+        assert len(message) < 500
         assert time.process_time() - began < 1.0
     return refused

@@ -43,7 +43,7 @@ class _Stage:
             a = (drive - s.damping * v - s.stiffness * x - force) / s.mass
             return [v, a, q2 * v, (s.up - s.a2 * q1 - sign * s.a1 * q2) * v]
 
-        found = solve_ivp(
+        solution = solve_ivp(
             rhs,
             (t, end),
             y,
@@ -54,17 +54,17 @@ class _Stage:
             max_step=(end - t) / 8,
         )
         fine = np.linspace(t, end, 65)
-        v = sign * found.sol(fine)[1]
+        v = sign * solution.sol(fine)[1]
         # The first interval may begin at rest.
         against = np.flatnonzero(v[1:] < 0.0)
         if against.size == 0:
-            return end, found.y[:, -1], False
+            return end, solution.y[:, -1], False
         k = int(against[0])
         low, high = fine[k], fine[k + 1]
-        if sign * found.sol(low)[1] <= 0.0:
-            return float(low), np.asarray(found.sol(low)), True
-        turn = brentq(lambda time: found.sol(time)[1], low, high, xtol=1e-16)
-        y = np.array(found.sol(turn))
+        if sign * solution.sol(low)[1] <= 0.0:
+            return float(low), np.asarray(solution.sol(low)), True
+        turn = brentq(lambda time: solution.sol(time)[1], low, high, xtol=1e-16)
+        y = np.array(solution.sol(turn))
         y[1] = 0.0
         return float(turn), y, True
 

@@ -110,10 +110,10 @@ def _serve(connection: socket.socket, answer: Callable[[str], Said]) -> None:
             # The state of the generator is asked for by a byte without an end.
             while found := re.match(r"\x09|[^\n]*\n", pending):
                 pending = pending[found.end() :]
-                said = answer(found[0].rstrip("\n"))
-                if said is None:
+                reply = answer(found[0].rstrip("\n"))
+                if reply is None:
                     return
-                for piece in [said] if isinstance(said, str) else said:
+                for piece in [reply] if isinstance(reply, str) else reply:
                     connection.sendall(piece.encode("cp1252"))
 
 
@@ -181,9 +181,9 @@ def once(number: int, query: str, spoilt: Callable[[str], Said]) -> Callable[[st
     """Spoil the answer to a query when it is asked for the time `number`, which counts from 1."""
     times = 0
 
-    def spoil(line: str, said: str) -> Said:
+    def spoil(line: str, text: str) -> Said:
         nonlocal times
         times += line == query
-        return spoilt(said) if line == query and times == number else said
+        return spoilt(text) if line == query and times == number else text
 
     return spoil

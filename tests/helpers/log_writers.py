@@ -88,7 +88,7 @@ def lvm_segment(
     main = {name: one for name, one in signals.items() if name != "time"}
     count = max(values.size for values, _ in main.values())
     times = signals["time"][0] if "time" in signals else DT * np.arange(count)
-    said = count if samples is None else samples
+    samples_stated = count if samples is None else samples
 
     def entry(name: str, *values: object) -> str:
         return "\t".join([name, *map(str, values), ""])
@@ -96,7 +96,7 @@ def lvm_segment(
     titles = "\tX_Value\t".join(main) if columns == "Multi" else "\t".join(main)
     lines = [
         entry("Channels", len(main)),
-        entry("Samples", *[said] * len(main)),
+        entry("Samples", *[samples_stated] * len(main)),
         entry("Date", *["2024/03/12"] * len(main)),
         entry("Y_Unit_Label", *(unit for _, unit in main.values())),
         entry("X_Dimension", *["Time"] * len(main)),

@@ -81,35 +81,35 @@ class Instrument:
             line = re.sub(
                 r"(?i)\bVOLT ([\d.eE+-]+)", lambda m: f"VOLT {min(float(m[1]), CLIPPED)}", line
             )
-        said = self.inside.answer(line)
-        if said is None:
+        reply = self.inside.answer(line)
+        if reply is None:
             return b""
         if not reads:
             # The fault is of the sensor; of the link, where nothing can be read any more.
-            return b"" if fault == "silent" else said.encode() + b"\n"
-        return self._spoilt(fault, said)
+            return b"" if fault == "silent" else reply.encode() + b"\n"
+        return self._spoilt(fault, reply)
 
-    def _spoilt(self, fault: str, said: str) -> bytes | None:
+    def _spoilt(self, fault: str, answer: str) -> bytes | None:
         if fault == "drop":
             return None
         if fault == "silent":
             return b""
         if fault == "half":
-            return said[: len(said) // 2].encode()
+            return answer[: len(answer) // 2].encode()
         if fault == "late":
             time.sleep(self.late)
-        number = float(said)
+        number = float(answer)
         text = {
             "stale": self.last,
             "nan": "9.91E+37",
             "nm": f"{1e3 * number:.3f}",
             "nm unit": f"{1e3 * number:.3f} nm",
             "jump": f"{number + JUMP:.6f}",
-            "twice": f"{said}\n{said}",
+            "twice": f"{answer}\n{answer}",
             "garbage": "busy",
-        }.get(fault, said)
+        }.get(fault, answer)
         if fault == "none":
-            self.last = said
+            self.last = answer
         return text.encode() + b"\n"
 
     def converse(self, link: socket.socket) -> None:
@@ -117,10 +117,10 @@ class Instrument:
         while part := link.recv(65536):
             *lines, rest = (rest + part).split(b"\n")
             for line in lines:
-                said = self.answer(line.decode("ascii", "replace"))
-                if said is None:
+                reply = self.answer(line.decode("ascii", "replace"))
+                if reply is None:
                     return
-                link.sendall(said)
+                link.sendall(reply)
 
 
 def main() -> None:

@@ -123,15 +123,15 @@ def models() -> list[str]:
 def binary_logs() -> dict[str, bytes]:
     """The same log in the formats that are not text, by their endings."""
     data = pt.Dataset(u=VOLTS, y=1.2e-6 * VOLTS, t=TIMES)
-    found = {}
+    logs = {}
     with tempfile.TemporaryDirectory() as folder:
         for ending in (".npz", ".mat", ".parquet"):
-            found[ending] = data.save(Path(folder, f"log{ending}")).read_bytes()
+            logs[ending] = data.save(Path(folder, f"log{ending}")).read_bytes()
         for ending, write in ((".h5", _write_hdf5), (".tdms", _write_tdms), (".mf4", _write_mdf)):
             path = Path(folder, f"log{ending}")
             write(path)
-            found[ending] = path.read_bytes()
-    return found
+            logs[ending] = path.read_bytes()
+    return logs
 
 
 def _write_hdf5(path: Path) -> None:

@@ -160,28 +160,28 @@ class NiStandIn(BaseInterpreter):  # type: ignore[misc]
         self, task: Any, count: Any, auto_start: Any, _timeout: Any, _layout: Any, data: Any
     ) -> int:
         self._called("write")
-        one, volts = self.tasks[task], np.array(data, dtype=float).reshape(-1)
+        state, volts = self.tasks[task], np.array(data, dtype=float).reshape(-1)
         assert volts.size == count
-        if np.any((volts < one.span[0]) | (volts > one.span[1])):
+        if np.any((volts < state.span[0]) | (volts > state.span[1])):
             raise self._error("Requested value is not a supported value for this property.")
-        if one.mode == AcquisitionType.FINITE.value:
-            if count != one.count or one.regenerates:
+        if state.mode == AcquisitionType.FINITE.value:
+            if count != state.count or state.regenerates:
                 raise self._error("The buffer was not filled as the timing says.")
-            one.table = volts
-        elif auto_start or one.started:
+            state.table = volts
+        elif auto_start or state.started:
             self.device.hold(float(volts[-1]))
         return int(count)
 
     def start_task(self, task: Any) -> None:
-        one = self.tasks[task]
-        self._called(f"start_{one.kind}")
-        rivals = [t for t in self.tasks.values() if t.kind == one.kind and t.started]
+        state = self.tasks[task]
+        self._called(f"start_{state.kind}")
+        rivals = [t for t in self.tasks.values() if t.kind == state.kind and t.started]
         if rivals:
             raise self._error("The specified resource is reserved.")
-        one.started = True
-        if one.kind != "ao" or one.table is None:
+        state.started = True
+        if state.kind != "ao" or state.table is None:
             return
-        record = self.device.play(one.table, one.rate)
+        record = self.device.play(state.table, state.rate)
         for other in self.tasks.values():
             armed = other.started and other.trigger == "/Dev1/ao/StartTrigger"
             if other.kind == "ai" and armed and other.source == "/Dev1/ao/SampleClock":
@@ -198,13 +198,13 @@ class NiStandIn(BaseInterpreter):  # type: ignore[misc]
         self, task: Any, count: Any, _timeout: Any, _mode: Any, data: Any
     ) -> tuple[Any, int]:
         self._called("read")
-        one = self.tasks[task]
-        if one.mode != AcquisitionType.FINITE.value:
+        state = self.tasks[task]
+        if state.mode != AcquisitionType.FINITE.value:
             data[0] = self.device.exchange(self.device.held) / self.scale
             return data, 1
-        if one.read is None:
+        if state.read is None:
             raise self._error("Some or all of the samples requested have not yet been acquired.")
-        data[:count] = one.read[:count]
+        data[:count] = state.read[:count]
         return data, count
 
     def get_read_attribute_uint32(self, _task: Any, _attribute: Any) -> int:

@@ -107,7 +107,7 @@ def entries(
     priors: Mapping[str, Any] | None = None,
 ) -> dict[str, pt.Parameter]:
     """Parameters of which one or several things are said, each in a mapping of its own."""
-    said: dict[str, dict[str, Any]] = {}
+    values_of: dict[str, dict[str, Any]] = {}
     for what, mapping in (
         ("prior", priors),
         ("value", fixed),
@@ -116,8 +116,8 @@ def entries(
         ("tie", ties),
     ):
         for name, value in (mapping or {}).items():
-            said.setdefault(name, {})[what] = value
-    return {name: pt.Parameter(**values) for name, values in said.items()}
+            values_of.setdefault(name, {})[what] = value
+    return {name: pt.Parameter(**values) for name, values in values_of.items()}
 
 
 def quick_fit(
@@ -131,13 +131,13 @@ def quick_fit(
     **arguments: Any,
 ) -> pt.identification.Identification:
     """Search the paper's box on the quick record with a small swarm; by descents without one."""
-    said = {name: arguments.pop(name, None) for name in ("scales", "ties", "priors")}
+    given = {name: arguments.pop(name, None) for name in ("scales", "ties", "priors")}
     return pt.identify(
         quick() if data is None else data,
         arguments.pop("model", "dahl"),
         # As it was made: what came before is not what these searches are about.
         history=arguments.pop("history", "virgin"),
-        parameters=entries(fixed=fixed, bounds=bounds, **said),
+        parameters=entries(fixed=fixed, bounds=bounds, **given),
         method=pt.Descents(seed=seed, runs=runs or 1)
         if swarm is None
         else replace(swarm, seed=seed, runs=runs),

@@ -217,12 +217,12 @@ def faults_of_command(arguments: list[str]) -> tuple[list[str], int | None]:
     error = result.exception
     if error is not None and not isinstance(error, SystemExit):
         return [f"{type(error).__name__}: {str(error)[:80]}"], None
-    code, said = result.exit_code, result.stderr
+    code, message = result.exit_code, result.stderr
     if code == 0:
         return [], code
-    if code == 2 and said.startswith("Usage"):
+    if code == 2 and message.startswith("Usage"):
         return [], code
-    if code == 2 and re.fullmatch(r"piezotrack: [^\n]+\n", said) and result.stdout == "":
+    if code == 2 and re.fullmatch(r"piezotrack: [^\n]+\n", message) and result.stdout == "":
         # The name of the program and the file come on top.
-        return bad_message(said.rstrip("\n")[: LONGEST_MESSAGE + 1]), code
-    return [f"exit {code}: {said[:80]}"], code
+        return bad_message(message.rstrip("\n")[: LONGEST_MESSAGE + 1]), code
+    return [f"exit {code}: {message[:80]}"], code

@@ -150,10 +150,10 @@ def natural_frequency(model: pt.stages.Stage) -> float | None:
 def score(cases: list[tuple[Case, pt.identification.Identification]]) -> tuple[int, int]:
     """How many fits are within three times the noise, and how many have the mode."""
     near = sum(fit.cost < 3.0 * one.noise for one, fit in cases)
-    found = [natural_frequency(fit.model) for _, fit in cases]
+    frequencies = [natural_frequency(fit.model) for _, fit in cases]
     modes = sum(
         one.frequency is not None and fn is not None and abs(fn / one.frequency - 1.0) < 0.05
-        for (one, _), fn in zip(cases, found, strict=True)
+        for (one, _), fn in zip(cases, frequencies, strict=True)
     )
     return near, modes
 
@@ -208,16 +208,20 @@ def test_two_modes() -> None:
 
 
 def test_the_search_keeps_to_the_mode_that_the_record_shows() -> None:
-    one = case(0, dahl, quick=True)
+    record = case(0, dahl, quick=True)
     short = pt.ParticleSwarm(particles=4, iterations=1, polish=False)
     fit = pt.identify(
-        one.log, "first-order-dahl", method=replace(short, runs=1), history="virgin", progress=False
+        record.log,
+        "first-order-dahl",
+        method=replace(short, runs=1),
+        history="virgin",
+        progress=False,
     )
     bounds = fit.parameters["mass"].bounds
     assert bounds is not None
     slowest, fastest = (np.sqrt(STIFFNESS / mass) / (2.0 * np.pi) for mass in bounds[::-1])
-    assert one.frequency is not None
-    assert slowest < one.frequency < fastest < 3.0 * slowest
+    assert record.frequency is not None
+    assert slowest < record.frequency < fastest < 3.0 * slowest
 
 
 def test_plays_gather_where_those_of_the_stage_are() -> None:

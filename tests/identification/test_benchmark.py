@@ -122,10 +122,10 @@ def test_a_loop_of_noise_has_no_discrete_backlash() -> None:
 
 def test_fifteen_lines_have_the_figures_of_other_people_s_runs() -> None:
     # 0.715 % where fitted and 0.572 % on the other log, with the data's README as the rule.
-    found = pt.benchmark(["measured"], ["plays-nnls"]).results[0]
-    assert [part.part for part in found.parts] == ["fitted", "rest", "other log"]
-    assert found.parts[0].rms_percent == pytest.approx(0.715, abs=0.0006)
-    assert found.parts[2].rms_percent == pytest.approx(0.572, abs=0.002)
+    result = pt.benchmark(["measured"], ["plays-nnls"]).results[0]
+    assert [part.part for part in result.parts] == ["fitted", "rest", "other log"]
+    assert result.parts[0].rms_percent == pytest.approx(0.715, abs=0.0006)
+    assert result.parts[2].rms_percent == pytest.approx(0.572, abs=0.002)
 
 
 # Records.
@@ -133,7 +133,7 @@ def test_fifteen_lines_have_the_figures_of_other_people_s_runs() -> None:
 
 @pytest.mark.slow
 def test_the_bouc_wen_benchmark_has_the_published_signals() -> None:
-    one = RECORDS["bouc-wen-benchmark"]()
+    record = RECORDS["bouc-wen-benchmark"]()
     u = multisine(3)
     assert u.size == 8192 * 20
     assert np.sqrt(np.mean(u**2)) == pytest.approx(50.0, rel=1e-12)
@@ -142,16 +142,16 @@ def test_the_bouc_wen_benchmark_has_the_published_signals() -> None:
     inside = (frequency >= 5.0) & (frequency <= 150.0)
     assert lines[inside].min() == pytest.approx(lines[inside].max(), rel=1e-9)
     assert lines[~inside].max() < 1e-9 * lines[inside].max()
-    sizes = {part: data.full.u[::4].size for part, data in one.parts()}
+    sizes = {part: data.full.u[::4].size for part, data in record.parts()}
     assert sizes == {"fitted": 2 * 8192, "multisine": 2 * 8192, "sine sweep": 153000}
-    sweep = one.others["sine sweep"]
+    sweep = record.others["sine sweep"]
     assert (sweep.drive_unit, sweep.dt) == ("N", 1.0 / 3000.0)
     assert np.abs(sweep.u).max() == pytest.approx(40.0, rel=1e-3)
     # 10 Hz a minute: so many turns from its beginning on.
     turns = np.count_nonzero(np.diff(np.sign(sweep.u)) != 0)
     assert turns == pytest.approx(2.0 * (18.0 * 204.0 + 204.0**2 / 12.0), abs=2)
     # Table 1 of Noel and Schoukens 2016; beta is held at 1.
-    assert one.truth == pytest.approx(
+    assert record.truth == pytest.approx(
         {
             **{"mass": 2.0, "damping": 10.0, "stiffness": 5e4, "alpha": 5e4},
             **{"gamma": 800.0, "delta": -1100.0},
@@ -186,29 +186,29 @@ def test_rate_dependent_plays_follow_their_equations(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("name", ["creep", "mode", "asymmetry", "rate-1hz", "rate-three"])
 def test_a_made_up_record_has_its_noise_and_begins_at_rest(name: str) -> None:
-    one = RECORDS[name]()
-    assert one.noise == 20e-9
-    assert one.fitted.u[0] == 0.0
-    assert 30e-6 < one.fitted.stroke < 50e-6
-    assert one.rest is not None
+    made = RECORDS[name]()
+    assert made.noise == 20e-9
+    assert made.fitted.u[0] == 0.0
+    assert 30e-6 < made.fitted.stroke < 50e-6
+    assert made.rest is not None
     # Nothing of the rest is in the part that is fitted.
-    assert one.fitted.t[-1] < one.rest.t[0]
-    assert one.fitted.warmup == 0
+    assert made.fitted.t[-1] < made.rest.t[0]
+    assert made.fitted.warmup == 0
 
 
 def test_one_record_of_three_rates_tells_the_rate() -> None:
     """Plays that know the rate are at the noise at each one, others are off at the fast one."""
-    (one,) = records_named(["rate-three"])
-    assert list(one.others) == ["at 0.1 Hz", "at 1 Hz", "at 10 Hz"]
-    assert [round(1.0 / (200 * log.dt), 6) for log in one.others.values()] == [0.1, 1.0, 10.0]
+    (entry,) = records_named(["rate-three"])
+    assert list(entry.others) == ["at 0.1 Hz", "at 1 Hz", "at 10 Hz"]
+    assert [round(1.0 / (200 * log.dt), 6) for log in entry.others.values()] == [0.1, 1.0, 10.0]
     # One cycle of the slowest, four and 24 of the others.
-    assert one.fitted.duration == pytest.approx(10.0 + 4.0 + 2.4)
+    assert entry.fitted.duration == pytest.approx(10.0 + 4.0 + 2.4)
     for model, limits in (
         ("rate-dependent-prandtl-ishlinskii", [0.0, 1.25]),
         ("prandtl-ishlinskii", [3.0, 6.0]),
     ):
-        fit = pt.identify(one.fitted, model)
-        errors = [fit.score(log).rms for log in one.others.values()]
+        fit = pt.identify(entry.fitted, model)
+        errors = [fit.score(log).rms for log in entry.others.values()]
         assert limits[0] < errors[2] / 20e-9 < limits[1], model
         assert max(errors[:2]) < 2.0 * 20e-9, model
 
@@ -220,13 +220,13 @@ def test_the_package_finds_asymmetry_to_the_noise() -> None:
 
 @pytest.mark.slow
 def test_the_package_finds_the_bouc_wen_benchmark_from_noisy_data() -> None:
-    found = pt.benchmark(["bouc-wen-benchmark"], ["bouc-wen-oscillator"]).results[0]
-    fitted, multisine_error, sweep_error = (part.rms for part in found.parts)
+    result = pt.benchmark(["bouc-wen-benchmark"], ["bouc-wen-oscillator"]).results[0]
+    fitted, multisine_error, sweep_error = (part.rms for part in result.parts)
     assert fitted == pytest.approx(7e-6, rel=0.03)
     assert multisine_error < 1e-6
     assert sweep_error < 1e-6
-    assert found.parameters.keys() == {"mass", "damping", "stiffness", "alpha", "gamma", "delta"}
-    assert all(abs(one["percent"]) < 1.0 for one in found.parameters.values())
+    assert result.parameters.keys() == {"mass", "damping", "stiffness", "alpha", "gamma", "delta"}
+    assert all(abs(one["percent"]) < 1.0 for one in result.parameters.values())
 
 
 # Scores.
@@ -236,14 +236,14 @@ def test_a_model_is_scored_with_one_offset_on_a_record_and_another_on_another() 
     def known(u: Array, dt: float) -> Array:
         return 4e-6 * u + 7e-6 + 1e-9 * np.arange(u.size) * dt
 
-    found = result_of(contender_of("known", "known", known), record())
-    fitted, rest, other = found["parts"]
+    result = result_of(contender_of("known", "known", known), record())
+    fitted, rest, other = result["parts"]
     # A drift of 1 nm/s: over 8 s, and from the middle of that to the rest at 10 to 20 s.
     assert fitted["rms_m"] == pytest.approx(8e-9 / np.sqrt(12.0), rel=1e-3)
     assert rest["rms_m"] == pytest.approx(np.hypot(9e-9, 10e-9 / np.sqrt(12.0)), rel=1e-3)
     assert other["rms_m"] == pytest.approx(20e-9 / np.sqrt(12.0), rel=1e-3)
-    assert found["values"] is None
-    assert found["inverse"]["error"] == "it has no inverse"
+    assert result["values"] is None
+    assert result["inverse"]["error"] == "it has no inverse"
     # Without offsets of their own nothing is taken off.
     strict = result_of(contender_of("known", "known", known), record(own_offsets=False))
     assert strict["parts"][0]["rms_m"] == pytest.approx(7e-6, rel=1e-2)
@@ -262,10 +262,10 @@ def test_an_inverse_is_scored_in_volts_and_by_what_the_model_makes_of_it() -> No
         predict.inverse = lambda x, _: 1.01 * x / slope  # type: ignore[attr-defined]
         return predict
 
-    found = result_of(contender_of("line", "line", fit), record())
-    inverse = found["inverse"]
+    result = result_of(contender_of("line", "line", fit), record())
+    inverse = result["inverse"]
     assert inverse["part"] == "other log"
-    assert found["values"] == 1
+    assert result["values"] == 1
     spread = np.std(ramp_log().u)
     assert inverse["drive_rms"] == pytest.approx(0.01 * spread, rel=1e-2)
     assert inverse["drive_percent"] == pytest.approx(0.1 * spread, rel=1e-2)
@@ -381,10 +381,10 @@ def test_an_installed_model_that_does_not_conform_is_a_sentence(
     site: Path, code: str, words: str
 ) -> None:
     install(site, code)
-    found = pt.benchmark([record()], ["gain"]).results[0]
-    assert found.error is not None
-    assert words in found.error
-    assert not found.parts
+    result = pt.benchmark([record()], ["gain"]).results[0]
+    assert result.error is not None
+    assert words in result.error
+    assert not result.parts
 
 
 # Refusals.

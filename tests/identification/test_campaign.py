@@ -40,26 +40,26 @@ def run(
 
 def test_every_record_model_and_seed_is_identified_as_by_hand(tmp_path: Path) -> None:
     models = {"quick": QUICK, PLAYS: {}}
-    found, tasks = run(tmp_path / "new" / "folder", [log(), log(0.9)], models, [3, 5])
+    campaign, tasks = run(tmp_path / "new" / "folder", [log(), log(0.9)], models, [3, 5])
     # Least squares need no seed.
-    assert tasks == len(found) == 2 * (2 + 1)
-    assert [(one.record, one.model, one.seed) for one in found[:4]] == [
+    assert tasks == len(campaign) == 2 * (2 + 1)
+    assert [(one.record, one.model, one.seed) for one in campaign[:4]] == [
         ("stage 1.csv", "quick", 3),
         ("stage 1.csv", "quick", 5),
         ("stage 1.csv", PLAYS, None),
         ("stage 0.9.csv", "quick", 3),
     ]
-    for one in found:
-        record = log() if one.record == "stage 1.csv" else log(0.9)
-        seeded = {**QUICK, "method": replace(QUICK["method"], seed=one.seed or 0)}
-        fit = pt.identify(record, **(seeded if one.model == "quick" else {"model": PLAYS}))
-        loaded = pt.load(one.file)
-        assert loaded.model == one.fit.model == fit.model
-        assert (loaded.offset, one.rms, one.notes) == (fit.offset, fit.cost, fit.notes)
+    for result in campaign:
+        record = log() if result.record == "stage 1.csv" else log(0.9)
+        seeded = {**QUICK, "method": replace(QUICK["method"], seed=result.seed or 0)}
+        fit = pt.identify(record, **(seeded if result.model == "quick" else {"model": PLAYS}))
+        loaded = pt.load(result.file)
+        assert loaded.model == result.fit.model == fit.model
+        assert (loaded.offset, result.rms, result.notes) == (fit.offset, fit.cost, fit.notes)
         assert loaded.fitted_on(record)
         # A model file of identify, and the entry of the campaign beside it.
-        content = json.loads(one.file.read_bytes())
-        assert content.pop("campaign")["task"] == one.task == one.file.stem
+        content = json.loads(result.file.read_bytes())
+        assert content.pop("campaign")["task"] == result.task == result.file.stem
         fit.save(tmp_path / "by hand.json")
         assert content == json.loads((tmp_path / "by hand.json").read_bytes())
 
@@ -96,37 +96,37 @@ def test_a_second_run_does_only_what_is_missing(tmp_path: Path) -> None:
     # More seeds, records and models.
     assert run(tmp_path, [log()], {"quick": QUICK}, range(3))[1] == 1
     assert run(tmp_path, [log(0.9), log()], {"quick": QUICK}, range(3))[1] == 3
-    found, tasks = run(tmp_path, [log(0.9)], {"quick": QUICK, PLAYS: {}}, [0])
-    assert (len(found), tasks) == (2, 1)
+    campaign, tasks = run(tmp_path, [log(0.9)], {"quick": QUICK, PLAYS: {}}, [0])
+    assert (len(campaign), tasks) == (2, 1)
     # All of it, without the records.
     everything = pt.identification.Campaign.load(tmp_path)
     assert len(everything) == 7
     assert set(everything.models) == {"quick", PLAYS}
-    one = next(one for one in everything if one.task == found[0].task)
-    assert (one.record, one.seed, one.fit.model) == ("stage 0.9.csv", 0, found[0].fit.model)
+    one = next(one for one in everything if one.task == campaign[0].task)
+    assert (one.record, one.seed, one.fit.model) == ("stage 0.9.csv", 0, campaign[0].fit.model)
 
 
 def test_a_damaged_file_and_that_of_another_task_are_computed_again(tmp_path: Path) -> None:
-    found, _ = run(tmp_path, [log(), log(0.9)], {"quick": QUICK})
+    campaign, _ = run(tmp_path, [log(), log(0.9)], {"quick": QUICK})
     whole = contents(tmp_path)
-    found[0].file.write_bytes(found[0].file.read_bytes()[:-100])
-    found[1].file.write_bytes(whole[f"{found[0].task}.json"])
+    campaign[0].file.write_bytes(campaign[0].file.read_bytes()[:-100])
+    campaign[1].file.write_bytes(whole[f"{campaign[0].task}.json"])
     assert run(tmp_path, [log(), log(0.9)], {"quick": QUICK})[1] == 2
     assert contents(tmp_path) == whole
 
 
 def test_a_task_that_finds_no_model_stops_no_other_and_is_tried_again(tmp_path: Path) -> None:
-    found, tasks = run(tmp_path, [flat(), log()], {"quick": QUICK, PLAYS: {}})
+    campaign, tasks = run(tmp_path, [flat(), log()], {"quick": QUICK, PLAYS: {}})
     assert tasks == 4
-    assert [one.error is None for one in found] == [False, False, True, True]
-    assert str(found[0].error).startswith("the drive is constant at 1 V in the window")
-    assert [one.record for one in found.failed] == ["flat.csv", "flat.csv"]
-    assert np.isnan(found[0].rms)
+    assert [one.error is None for one in campaign] == [False, False, True, True]
+    assert str(campaign[0].error).startswith("the drive is constant at 1 V in the window")
+    assert [one.record for one in campaign.failed] == ["flat.csv", "flat.csv"]
+    assert np.isnan(campaign[0].rms)
     with pytest.raises(pt.DataError, match=r"no model was found of flat.csv: the drive is const"):
-        _ = found[0].fit
+        _ = campaign[0].fit
     with pytest.raises(pt.DataError, match="is not a piezotrack model"):
-        pt.load(found[0].file)
-    assert "failed  flat.csv, quick, seed 0: the drive is constant" in found.summary()
+        pt.load(campaign[0].file)
+    assert "failed  flat.csv, quick, seed 0: the drive is constant" in campaign.summary()
     again, tasks = run(tmp_path, [flat(), log()], {"quick": QUICK, PLAYS: {}})
     assert tasks == 2
     assert len(again.failed) == 2
@@ -140,10 +140,10 @@ def test_what_failed_once_is_replaced_when_it_works(
 
     with monkeypatch.context() as patch:
         patch.setattr(campaign_task, "solve", out_of_memory)
-        found, _ = run(tmp_path, [log()], {"quick": QUICK})
-    assert found[0].error == "not enough memory"
-    found, tasks = run(tmp_path, [log()], {"quick": QUICK})
-    assert (tasks, found.failed, len(results(tmp_path))) == (1, (), 1)
+        campaign, _ = run(tmp_path, [log()], {"quick": QUICK})
+    assert campaign[0].error == "not enough memory"
+    campaign, tasks = run(tmp_path, [log()], {"quick": QUICK})
+    assert (tasks, campaign.failed, len(results(tmp_path))) == (1, (), 1)
 
 
 def test_two_runs_at_a_time_write_the_same_files(tmp_path: Path) -> None:
@@ -270,8 +270,10 @@ def test_the_name_of_a_task_is_that_of_what_its_result_depends_on() -> None:
         method=pt.Descents(runs=np.int64(2)),  # type: ignore[arg-type]
         parameters={"b1": 2_000_000, "a1": pt.Parameter(np.float64(120))},
     )
-    one = task(record)
-    assert one.name == replace(one, threads=7).name == pickle.loads(pickle.dumps(one)).name
+    planned = task(record)
+    assert (
+        planned.name == replace(planned, threads=7).name == pickle.loads(pickle.dumps(planned)).name
+    )
     assert name(record) == name(record, offset=True) == name(record, model="dahl", method=None)
     other = pt.Dataset(u=record.u, y=record.y, dt=record.dt, hold="zoh")
     later = pt.Dataset(u=record.u, y=record.y, t=record.t + 1.0)
@@ -294,7 +296,7 @@ def test_the_name_of_a_task_is_that_of_what_its_result_depends_on() -> None:
         name(record, delay=1),
         name(record, offset=False),
         name(record, history="virgin"),
-        replace(one, version="9.9").name,
+        replace(planned, version="9.9").name,
     ]
     assert len(set(names)) == len(names)
 
@@ -438,57 +440,57 @@ def test_records_of_one_name_have_titles_of_their_own(tmp_path: Path) -> None:
 
 
 def test_the_frame_has_a_row_for_each_task(tmp_path: Path) -> None:
-    found, _ = run(tmp_path, [log(), flat()], {"quick": QUICK, PLAYS: {}}, [0, 1])
-    frame = found.to_frame()
+    campaign, _ = run(tmp_path, [log(), flat()], {"quick": QUICK, PLAYS: {}}, [0, 1])
+    frame = campaign.to_frame()
     assert list(frame["record"]) == ["stage 1.csv"] * 3 + ["flat.csv"] * 3
     assert frame["seed"].tolist()[:2] == [0, 1]
     assert frame["seed"].isna().tolist() == [False, False, True] * 2
     assert frame["kind"][0] == "dahl"
-    fit = pt.load(found[0].file).model
+    fit = pt.load(campaign[0].file).model
     assert frame["stiffness_N/m"][0] == fit.stiffness
     assert np.isnan(frame["stiffness_N/m"][2])
-    assert frame["rms_um"][0] == pytest.approx(1e6 * found[0].rms)
-    assert frame["rms_percent"][0] == pytest.approx(100 * found[0].rms / log().stroke)
+    assert frame["rms_um"][0] == pytest.approx(1e6 * campaign[0].rms)
+    assert frame["rms_percent"][0] == pytest.approx(100 * campaign[0].rms / log().stroke)
     assert frame["error"].isna().tolist() == [True] * 3 + [False] * 3
     assert "the drive is constant" in frame["error"][3]
-    path = found.to_parquet(tmp_path / "table.parquet")
+    path = campaign.to_parquet(tmp_path / "table.parquet")
     pd.testing.assert_frame_equal(pd.read_parquet(path), frame)
 
 
 def test_without_pyarrow_the_sentence_names_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found, _ = run(tmp_path, [log()], [PLAYS])
+    campaign, _ = run(tmp_path, [log()], [PLAYS])
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(pt.ParameterError, match="to_parquet needs pyarrow: expected it installed"):
-        found.to_parquet(tmp_path / "table.parquet")
+        campaign.to_parquet(tmp_path / "table.parquet")
     assert not (tmp_path / "table.parquet").exists()
 
 
 def test_the_table_shows_how_far_seeds_agree(tmp_path: Path) -> None:
-    found, _ = run(tmp_path, [log()], {"quick": QUICK, PLAYS: {}}, range(3))
-    costs = [one.rms_percent for one in found if one.seed is not None]
-    best = found.best["stage 1.csv", "quick"]
+    campaign, _ = run(tmp_path, [log()], {"quick": QUICK, PLAYS: {}}, range(3))
+    costs = [one.rms_percent for one in campaign if one.seed is not None]
+    best = campaign.best["stage 1.csv", "quick"]
     assert best.rms_percent == min(costs)
-    line = next(line for line in found.summary().splitlines() if "quick" in line)
+    line = next(line for line in campaign.summary().splitlines() if "quick" in line)
     words = line.split()
     assert words[2:5] == ["quick", "3", f"{min(costs):.4g}"]
     agree = sum(cost <= 1.001 * min(costs) for cost in costs)
     assert words[7] == str(agree)
     # One result has no median and no highest, and agrees with none.
-    single = [line.split() for line in found.summary().splitlines() if f" {PLAYS} " in line]
+    single = [line.split() for line in campaign.summary().splitlines() if f" {PLAYS} " in line]
     assert single[0][-4:-1] == ["-", "-", "-"]
-    assert "<td>quick</td>" in found._repr_html_()
-    assert repr(found) == "<Campaign, 1 record, 2 models, 4 tasks; see summary()>"
+    assert "<td>quick</td>" in campaign._repr_html_()
+    assert repr(campaign) == "<Campaign, 1 record, 2 models, 4 tasks; see summary()>"
 
 
 def test_the_picture_shows_every_task(tmp_path: Path) -> None:
-    found, _ = run(tmp_path, [log(), flat()], {"quick": QUICK, PLAYS: {}}, [0, 1])
-    figure = found.plot(fig=Figure())
+    campaign, _ = run(tmp_path, [log(), flat()], {"quick": QUICK, PLAYS: {}}, [0, 1])
+    figure = campaign.plot(fig=Figure())
     costs: Any = figure.axes[0]
     apart: Any = figure.axes[1]
     drawn = sorted(x for line in costs.get_lines()[:2] for x in line.get_xdata())
-    assert drawn == pytest.approx(sorted(one.rms_percent for one in found[:3]))
+    assert drawn == pytest.approx(sorted(one.rms_percent for one in campaign[:3]))
     crosses = next(line for line in costs.get_lines() if line.get_label() == "no model found")
     assert len(crosses.get_xdata()) == 3
     assert [text.get_text() for text in costs.get_yticklabels()] == ["stage 1.csv", "flat.csv"]

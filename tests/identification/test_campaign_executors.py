@@ -105,12 +105,12 @@ def test_a_dask_worker_that_is_killed_changes_no_bit(
             kill(busy[0])
 
         with after_some(tmp_path, 3, kill_a_busy_worker):
-            found = pt.campaign(records(), MODELS, SEEDS, client.get_executor(), folder=tmp_path)
+            campaign = pt.campaign(records(), MODELS, SEEDS, client.get_executor(), folder=tmp_path)
         # It was at work, and has gone; what it had was computed elsewhere.
         assert ended
         assert ended[0] not in client.run(os.getpid).values()
-        assert len(found) == len(serial)
-        assert found.failed == ()
+        assert len(campaign) == len(serial)
+        assert campaign.failed == ()
     assert results(tmp_path) == serial
     assert missing(tmp_path) == 0
 

@@ -30,7 +30,7 @@ def record(seed: int = 0, count: int = 2000) -> pt.Dataset:
     return pt.Dataset(u=u, y=x + np.random.default_rng(seed).normal(0.0, 5e-9, t.size), dt=DT)
 
 
-def found(fit: pt.identification.Identification) -> Any:
+def outcome(fit: pt.identification.Identification) -> Any:
     """All that a search says."""
     search = fit.search
     course = search and (search.history.tolist(), search.runs, search.npolish)
@@ -69,31 +69,55 @@ def interrupted(path: Path, after: int, log: pt.Dataset | None = None, **setting
 )
 def test_a_search_goes_on_to_the_same_bits(settings: dict[str, Any], tmp_path: Path) -> None:
     path, log = tmp_path / "search.checkpoint", record(count=600)
-    expected = found(pt.identify(log, **settings))
+    expected = outcome(pt.identify(log, **settings))
     assert interrupted(path, 3, log, **settings)
     sizes = [path.stat().st_size]
     assert interrupted(path, 9, log, **settings)
     sizes.append(path.stat().st_size)
     fit = pt.identify(log, checkpoint=path, **settings)
     sizes.append(path.stat().st_size)
-    assert found(fit) == expected
+    assert outcome(fit) == expected
     assert sizes == sorted(set(sizes))
     # A third time nothing is left to simulate, on any number of threads.
     content = path.read_bytes()
-    assert found(pt.identify(log, checkpoint=path, threads=1, **settings)) == expected
+    assert outcome(pt.identify(log, checkpoint=path, threads=1, **settings)) == expected
     assert path.read_bytes() == content
+
+
+def test_descents_after_a_swarm_go_on_too(tmp_path: Path) -> None:
+    stage = pt.FirstOrderDahlStage(
+        mass=0.16,
+        damping=500.0,
+        stiffness=1e6,
+        piezo_coefficient=1.8,
+        rest_stiffness=2.5e5,
+        coulomb_force=8.0,
+    )
+    u = 40.0 + 35.0 * np.sin(2 * np.pi * DT * np.arange(2000))
+    x = stage.simulate(u, DT, initial=stage.equilibrium([75.0, u[0]])).x
+    log, path = pt.Dataset(u=u, y=x, dt=DT), tmp_path / "search.checkpoint"
+    swarm = pt.ParticleSwarm(iterations=10, runs=1)
+    settings: dict[str, Any] = {"model": "first-order-dahl", "method": swarm}
+    seen: list[pt.identification.Progress] = []
+    fit = pt.identify(log, callback=seen.append, **settings)
+    assert fit.start is not None
+    assert fit.start.history == "fit"
+    # Within the descents.
+    assert len(seen) > swarm.iterations + 5
+    assert interrupted(path, swarm.iterations + 4, log, **settings)
+    assert found(pt.identify(log, checkpoint=path, **settings)) == found(fit)
 
 
 @pytest.mark.slow
 def test_fifty_interruptions_change_nothing(tmp_path: Path) -> None:
     settings: dict[str, Any] = {"model": "dahl", "method": pt.ParticleSwarm(runs=2)}
-    expected = found(pt.identify(record(), **settings))
+    expected = outcome(pt.identify(record(), **settings))
     path = tmp_path / "search.checkpoint"
     draws, after = random.Random(1), 0
     for _ in range(50):
         after += draws.randrange(6)
         assert interrupted(path, after, **settings)
-    assert found(pt.identify(record(), checkpoint=path, **settings)) == expected
+    assert outcome(pt.identify(record(), checkpoint=path, **settings)) == expected
 
 
 SEARCH = """
@@ -136,10 +160,10 @@ def test_a_killed_search_goes_on(kills: int, tmp_path: Path) -> None:
     whole = killed([arguments[0], str(tmp_path / "whole.checkpoint")], 600.0)
     draws, largest = random.Random(1), 0
     for _ in range(kills):
-        said = killed(arguments, draws.uniform(0.3, 1.0))
-        if said:
+        result = killed(arguments, draws.uniform(0.3, 1.0))
+        if result:
             # It came to its end before: the same, and once more from the beginning.
-            assert said == whole
+            assert result == whole
             path.unlink()
             largest = 0
             continue
@@ -208,11 +232,11 @@ def test_what_cannot_be_a_checkpoint_is_refused_before_the_search(tmp_path: Path
 def test_several_records_go_on_too(tmp_path: Path) -> None:
     path = tmp_path / "search.checkpoint"
     logs = [record(), record(seed=1, count=1500)]
-    expected = found(pt.identify(logs, "dahl"))
+    expected = outcome(pt.identify(logs, "dahl"))
     left = iter(range(5))
     with pytest.raises(pt.Interrupted):
         pt.identify(logs, "dahl", checkpoint=path, callback=lambda _: next(left, None) is None)
-    assert found(pt.identify(logs, "dahl", checkpoint=path)) == expected
+    assert outcome(pt.identify(logs, "dahl", checkpoint=path)) == expected
     with pytest.raises(pt.DataError, match="is that of another search"):
         pt.identify(logs[::-1], "dahl", checkpoint=path)
 

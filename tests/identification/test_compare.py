@@ -41,69 +41,69 @@ def log(seed: int = 1, shift: float = 3e-6) -> pt.Dataset:
 
 
 @cache
-def found() -> pt.identification.Comparison:
+def comparison_of_pair() -> pt.identification.Comparison:
     return pt.compare(log(), PAIR, train=(1.0, 5.0), seed=1, runs=1)
 
 
 def row(name: str, of: pt.identification.Comparison | None = None) -> pt.identification.ModelScore:
-    return {one.name: one for one in (of or found()).rows}[name]
+    return {one.name: one for one in (of or comparison_of_pair()).rows}[name]
 
 
 # What is fitted and what is judged.
 
 
 def test_a_model_is_what_identify_finds_on_the_fitted_part() -> None:
-    one = row("bouc-wen")
+    compared_row = row("bouc-wen")
     alone = pt.identify(log()[1.0:5.0], "bouc-wen", method=pt.Descents(seed=1))
-    assert one.fit.document() == alone.document()
-    assert one.train.rms == pytest.approx(alone.cost, rel=1e-9)
-    assert one.title == "Bouc-Wen"
-    assert found().fits == {one.name: one.fit for one in found().rows}
+    assert compared_row.fit.document() == alone.document()
+    assert compared_row.train.rms == pytest.approx(alone.cost, rel=1e-9)
+    assert compared_row.title == "Bouc-Wen"
+    assert comparison_of_pair().fits == {one.name: one.fit for one in comparison_of_pair().rows}
 
 
 def test_the_rest_is_simulated_through_with_state_and_offset_carried_on() -> None:
-    for one in found().rows:
-        assert one.fit.start is not None
-        begun = one.fit.start.state
-        through = one.fit.model.simulate(log().u, 0.005, initial=begun).x + one.fit.offset
+    for each in comparison_of_pair().rows:
+        assert each.fit.start is not None
+        begun = each.fit.start.state
+        through = each.fit.model.simulate(log().u, 0.005, initial=begun).x + each.fit.offset
         error = (log().y - through)[1000:]
-        assert len(found().test) == 600
-        assert one.test.rms == pytest.approx(float(np.sqrt(np.mean(error**2))), rel=1e-9)
-        assert one.test.max_error == pytest.approx(float(np.abs(error).max()), rel=1e-9)
-        assert one.test.offset == one.train.offset == one.fit.offset
-        assert one.test.stroke == one.train.stroke == log()[1.0:5.0].stroke
-    assert found().carried
+        assert len(comparison_of_pair().test) == 600
+        assert each.test.rms == pytest.approx(float(np.sqrt(np.mean(error**2))), rel=1e-9)
+        assert each.test.max_error == pytest.approx(float(np.abs(error).max()), rel=1e-9)
+        assert each.test.offset == each.train.offset == each.fit.offset
+        assert each.test.stroke == each.train.stroke == log()[1.0:5.0].stroke
+    assert comparison_of_pair().carried
     # A restart would have forgotten what the plays remember.
     best = row("prandtl-ishlinskii").fit
     again = best.score(log().cut(5.0), offset=best.offset, history="virgin")
-    assert again.rms > 5.0 * found().best.test.rms
+    assert again.rms > 5.0 * comparison_of_pair().best.test.rms
 
 
 def test_what_the_record_is_made_of_is_best() -> None:
-    assert found().best.name == "prandtl-ishlinskii"
+    assert comparison_of_pair().best.name == "prandtl-ishlinskii"
     # Nothing but the noise is left, where it was fitted and where not.
-    assert found().best.train.rms == pytest.approx(NOISE, rel=0.1)
-    assert found().best.test.rms == pytest.approx(NOISE, rel=0.15)
+    assert comparison_of_pair().best.train.rms == pytest.approx(NOISE, rel=0.1)
+    assert comparison_of_pair().best.test.rms == pytest.approx(NOISE, rel=0.15)
     assert row("bouc-wen").test.rms > 2.5 * NOISE
-    assert abs(found().best.autocorrelation) < 0.15
+    assert abs(comparison_of_pair().best.autocorrelation) < 0.15
     assert row("bouc-wen").autocorrelation > 0.8
 
 
 def test_the_criteria_are_burnham_and_andersons() -> None:
-    data = found().train
-    for one in found().rows:
-        error = data.y - one.fit.simulate(data, offset=one.fit.offset).x
+    data = comparison_of_pair().train
+    for each in comparison_of_pair().rows:
+        error = data.y - each.fit.simulate(data, offset=each.fit.offset).x
         n, rss = error.size, float(np.sum(error**2))
         # b/k, d, alpha, beta, gamma, n, as nothing excites a mode of some mass; w0, twenty weights,
         # two bends, no lag, as there is none; the offset each.
-        free = 7 if one.name == "bouc-wen" else 24
-        assert one.parameters == free
+        free = 7 if each.name == "bouc-wen" else 24
+        assert each.parameters == free
         likelihood = n * np.log(rss / n)
-        assert one.aic == pytest.approx(likelihood + 2 * (free + 1), rel=1e-12)
-        assert one.bic == pytest.approx(likelihood + (free + 1) * np.log(n), rel=1e-12)
+        assert each.aic == pytest.approx(likelihood + 2 * (free + 1), rel=1e-12)
+        assert each.bic == pytest.approx(likelihood + (free + 1) * np.log(n), rel=1e-12)
         from_mean = error - error.mean()
         lagged = float(from_mean[:-1] @ from_mean[1:]) / float(from_mean @ from_mean)
-        assert one.autocorrelation == pytest.approx(lagged, rel=1e-9)
+        assert each.autocorrelation == pytest.approx(lagged, rel=1e-9)
 
 
 def windows(comparison: pt.identification.Comparison) -> list[tuple[float, float, int]]:
@@ -131,13 +131,13 @@ def test_windows_where_nothing_is_said() -> None:
 def test_another_record_has_an_offset_of_its_own() -> None:
     other = log(seed=2, shift=-7e-6)
     comparison = pt.compare(log(), ["prandtl-ishlinskii"], test=other[1.0:])
-    one = comparison.rows[0]
+    first = comparison.rows[0]
     assert not comparison.carried
     assert comparison.train is log()
-    assert one.test.offset == pytest.approx(-7e-6, abs=0.05e-6)
-    assert one.train.offset == pytest.approx(3e-6, abs=0.05e-6)
-    assert one.test.rms == pytest.approx(NOISE, rel=0.1)
-    assert one.test.rms == one.fit.score(other[1.0:]).rms
+    assert first.test.offset == pytest.approx(-7e-6, abs=0.05e-6)
+    assert first.train.offset == pytest.approx(3e-6, abs=0.05e-6)
+    assert first.test.rms == pytest.approx(NOISE, rel=0.1)
+    assert first.test.rms == first.fit.score(other[1.0:]).rms
 
 
 def test_all_kinds_are_compared_where_none_is_named() -> None:
@@ -161,12 +161,12 @@ def test_a_model_and_a_file_are_taken_as_they_are(tmp_path: Path) -> None:
         "Prandtl-Ishlinskii",
         "Prandtl-Ishlinskii (mine-2)",
     ]
-    for one in comparison.rows:
-        assert one.fit.model == elsewhere.model
+    for each in comparison.rows:
+        assert each.fit.model == elsewhere.model
         # It was not fitted here: there is nothing to count, and the offset is this part's.
-        assert (one.parameters, one.aic, one.bic) == (None, None, None)
+        assert (each.parameters, each.aic, each.bic) == (None, None, None)
         own = elsewhere.score(log()[1.0:5.0])
-        assert (one.train.rms, one.train.offset) == (own.rms, own.offset)
+        assert (each.train.rms, each.train.offset) == (own.rms, own.offset)
     criteria = [line.split() for line in comparison.summary().splitlines() if " - " in line]
     assert [words[-4:-1] for words in criteria[:3]] == [["-", "-", "-"]] * 3
     assert comparison.rows[0].train.fit_percent > 90.0
@@ -196,33 +196,33 @@ def test_a_file_keeps_its_name_when_all_are_saved_beside_it(tmp_path: Path) -> N
 
 
 def test_the_table_marks_the_best() -> None:
-    lines = found().summary().splitlines()
+    lines = comparison_of_pair().summary().splitlines()
     assert lines[0] == "fitted on 1 to 4.995 s of plays.csv, 800 samples"
     assert lines[1].endswith("600 samples; state and offset carried over")
     marked = [line[:20] for line in lines if line[2:20].strip() in ("Prandtl-Ishlinskii",)]
     assert marked == ["* Prandtl-Ishlinskii", "  Prandtl-Ishlinskii"]
     above, below = (line for line in lines if line.startswith("  Bouc-Wen"))
     figures = [float(text) for text in (above + below.partition("Wen")[2]).split()[1:]]
-    one = row("bouc-wen")
-    scores = [one.train.rms, one.test.rms, one.test.max_error]
+    shown = row("bouc-wen")
+    scores = [shown.train.rms, shown.test.rms, shown.test.max_error]
     assert [figures[i] for i in (0, 2, 4)] == pytest.approx([1e6 * s for s in scores], rel=1e-3)
-    explained = 100.0 * (1.0 - one.test.rms / float(np.std(found().test.y)))
+    explained = 100.0 * (1.0 - shown.test.rms / float(np.std(comparison_of_pair().test.y)))
     assert figures[5] == pytest.approx(explained, rel=1e-3)
     assert figures[6] == 7
-    best = found().best
-    assert one.aic is not None
+    best = comparison_of_pair().best
+    assert shown.aic is not None
     assert best.aic is not None
-    assert figures[7] == pytest.approx(one.aic - best.aic, rel=1e-3)
+    assert figures[7] == pytest.approx(shown.aic - best.aic, rel=1e-3)
     assert "doi 10.1007/b97636" in lines[-1]
-    assert "Prandtl-Ishlinskii 0.0" in repr(found())
+    assert "Prandtl-Ishlinskii 0.0" in repr(comparison_of_pair())
 
 
 def test_large_figures_stay_apart() -> None:
     rows = tuple(
         replace(one, aic=aic, bic=aic)
-        for one, aic in zip(found().rows, (-1.0e5, 123456.0), strict=True)
+        for one, aic in zip(comparison_of_pair().rows, (-1.0e5, 123456.0), strict=True)
     )
-    text = replace(found(), rows=rows).summary()
+    text = replace(comparison_of_pair(), rows=rows).summary()
     assert "     223456     223456" in text
     assert max(map(len, text.splitlines()[:12])) <= 80
 
@@ -240,7 +240,7 @@ def test_an_exact_fit_can_be_told_and_drawn() -> None:
 
 
 def test_the_picture_has_loops_bars_and_an_error_for_each() -> None:
-    figure = found().plot()
+    figure = comparison_of_pair().plot()
     loops, off, bars, *errors = figure.axes
     assert off.get_xlabel() == "drive [V]"
     assert loops.get_ylabel() == "displacement [um]"
@@ -250,7 +250,7 @@ def test_the_picture_has_loops_bars_and_an_error_for_each() -> None:
     assert len({line.get_linestyle() for line in loops.lines[1:]}) == 2
     # The loop is one cycle of what was not fitted, where one of them is furthest off.
     drawn = 1e-6 * np.asarray(loops.lines[0].get_ydata())
-    assert np.isin(np.round(drawn, 12), np.round(found().test.y, 12)).all()
+    assert np.isin(np.round(drawn, 12), np.round(comparison_of_pair().test.y, 12)).all()
     # Below it the difference of what is drawn above, over the same drive.
     for error, loop in zip(off.lines, loops.lines[1:], strict=False):
         unit = 1e-3 if "[nm]" in off.get_ylabel() else 1.0
@@ -258,16 +258,18 @@ def test_the_picture_has_loops_bars_and_an_error_for_each() -> None:
         assert np.allclose(unit * np.asarray(error.get_ydata()), 1e6 * drawn - simulated)
         assert np.allclose(np.asarray(error.get_xdata()), np.asarray(loop.get_xdata()))
     lengths = [patch.get_width() for patch in bars.patches if isinstance(patch, Rectangle)]
-    scores = [one.train for one in found().rows] + [one.test for one in found().rows]
+    scores = [one.train for one in comparison_of_pair().rows] + [
+        one.test for one in comparison_of_pair().rows
+    ]
     assert lengths == pytest.approx([score.rms_percent for score in scores])
     assert len(errors) == 2
-    for ax, one in zip(errors, found().rows, strict=True):
+    for ax, each in zip(errors, comparison_of_pair().rows, strict=True):
         fitted, judged, _, split = ax.lines
         unit = 1e-9 if "[nm]" in ax.get_ylabel() else 1e-6
         largest = [unit * float(np.abs(line.get_ydata()).max()) for line in (fitted, judged)]
-        assert largest == pytest.approx([one.train.max_error, one.test.max_error])
+        assert largest == pytest.approx([each.train.max_error, each.test.max_error])
         assert float(np.asarray(split.get_xdata())[0]) == pytest.approx(4.9975)
-        assert one.title in ax.get_title(loc="left")
+        assert each.title in ax.get_title(loc="left")
     assert errors[-1].get_xlabel() == "time [s]"
     plt.close(figure)
 
@@ -282,20 +284,20 @@ def test_another_record_is_drawn_behind_the_first() -> None:
 
 
 def test_it_is_saved_with_its_models(tmp_path: Path) -> None:
-    written = found().save(tmp_path / "out")
+    written = comparison_of_pair().save(tmp_path / "out")
     models = ["bouc-wen.json", "prandtl-ishlinskii.json"]
     expected = ["comparison.json", "comparison.png", "comparison.svg", *models]
     assert sorted(path.name for path in written) == names(str(tmp_path / "out")) == sorted(expected)
-    for one in found().rows:
-        assert pt.load(tmp_path / "out" / f"{one.name}.json").model == one.fit.model
+    for each in comparison_of_pair().rows:
+        assert pt.load(tmp_path / "out" / f"{each.name}.json").model == each.fit.model
     document = json.loads((tmp_path / "out" / "comparison.json").read_text())
     assert document["format"] == "piezotrack-comparison"
     assert document["best"] == "prandtl-ishlinskii"
     assert document["train"]["window_s"] == [1.0, pytest.approx(4.995)]
-    assert document["train"]["sha256"] == found().train.sha256
-    for entry, one in zip(document["models"], found().rows, strict=True):
-        assert entry["test"]["rms"] == one.test.rms
-        assert (entry["aic"], entry["parameters"]) == (one.aic, one.parameters)
+    assert document["train"]["sha256"] == comparison_of_pair().train.sha256
+    for entry, each in zip(document["models"], comparison_of_pair().rows, strict=True):
+        assert entry["test"]["rms"] == each.test.rms
+        assert (entry["aic"], entry["parameters"]) == (each.aic, each.parameters)
     again = pt.compare(log(), PAIR, train=(1.0, 5.0), seed=1, runs=1, threads=1)
     for path in again.save(tmp_path / "again"):
         assert path.read_bytes() == (tmp_path / "out" / path.name).read_bytes(), path.name

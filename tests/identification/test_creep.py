@@ -38,7 +38,7 @@ def record(stage: Any = STAGE, offset: float = 3e-6) -> pt.Dataset:
 
 
 @cache
-def found(
+def with_creep(
     *creep: float, offset: bool = True, delay: float = 0.0
 ) -> pt.identification.Identification:
     return pt.identify(
@@ -54,7 +54,7 @@ def found(
 
 @pytest.mark.parametrize("offset", [True, False])
 def test_finds_the_weights(offset: bool) -> None:
-    fit = found(0.3, 4.0, offset=offset)
+    fit = with_creep(0.3, 4.0, offset=offset)
     model = fit.model
     assert model.creep_times == (0.3, 4.0)
     assert model.creep_weights == pytest.approx((0.02, 0.03), rel=2e-3)
@@ -65,8 +65,8 @@ def test_finds_the_weights(offset: bool) -> None:
 
 
 def test_without_creep_the_record_is_not_followed() -> None:
-    assert found().model.creep_weights == ()
-    assert found().cost > 100.0 * found(0.3, 4.0).cost
+    assert with_creep().model.creep_weights == ()
+    assert with_creep().cost > 100.0 * with_creep(0.3, 4.0).cost
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.004])
@@ -74,14 +74,14 @@ def test_without_creep_the_record_is_not_followed() -> None:
 def test_the_cost_of_the_search_is_that_of_the_stage(
     creep: tuple[float, ...], delay: float
 ) -> None:
-    fit = found(*creep, delay=delay)
+    fit = with_creep(*creep, delay=delay)
     # The swarm steps to within 0.2 nm.
     assert fit.score(record()).rms == pytest.approx(fit.cost, abs=2e-10)
 
 
 def test_the_weights_are_those_of_linear_least_squares() -> None:
     """Small changes of a weight, the offset following, make the rest of the fit worse."""
-    fit = found(0.1, 1.0)
+    fit = with_creep(0.1, 1.0)
     for j in range(2):
         for change in (-1e-3, 1e-3):
             weights = list(fit.model.creep_weights)
@@ -115,24 +115,24 @@ def test_time_constants_from_the_record() -> None:
 
 def two_records(noise: float = 0.0) -> list[pt.Dataset]:
     """A slow one and a quick one, which a wave that no stage makes disturbs each in its own way."""
-    one = record()
+    slow = record()
     t = 2e-3 * np.arange(2000)
     u = 20.0 * (1 - np.cos(2 * np.pi * 5.0 * t))
     quick = pt.Dataset(u=u, y=STAGE.simulate(u, 2e-3).x - 1e-6, dt=2e-3)
     waves = [
-        noise * np.sin(2 * np.pi * rate * each.t) for rate, each in ((0.07, one), (0.9, quick))
+        noise * np.sin(2 * np.pi * rate * each.t) for rate, each in ((0.07, slow), (0.9, quick))
     ]
     return [
         pt.Dataset(u=each.u, y=each.y + wave, dt=each.dt)
-        for each, wave in zip((one, quick), waves, strict=True)
+        for each, wave in zip((slow, quick), waves, strict=True)
     ]
 
 
 def together(
-    records: list[pt.Dataset] | list[pt.Record], **asked: Any
+    records: list[pt.Dataset] | list[pt.Record], **settings: Any
 ) -> pt.identification.Identification:
-    asked = {"creep": (0.3, 4.0), "history": "virgin", "progress": False, **asked}
-    return pt.identify(records, "first-order-dahl", parameters=HELD, **asked)
+    settings = {"creep": (0.3, 4.0), "history": "virgin", "progress": False, **settings}
+    return pt.identify(records, "first-order-dahl", parameters=HELD, **settings)
 
 
 @pytest.mark.parametrize("method", ["descents", "swarm"])
@@ -155,11 +155,11 @@ def test_the_weights_are_those_of_least_squares_of_all_records(
     nnls = pytest.importorskip("scipy.optimize").nnls
     records = two_records(noise=1e-7)
     offsets = offset if isinstance(offset, list) else [offset] * 2
-    own = [
+    weighted = [
         pt.Record(data, offset=fitted, weight=weight, history="virgin")
         for data, fitted, weight in zip(records, offsets, weights, strict=True)
     ]
-    fit = together(own, history=None)
+    fit = together(weighted, history=None)
     alone = replace(fit.model, creep_weights=(), creep_times=())
     rows, measured = [], []
     for i, (data, weight) in enumerate(zip(records, weights, strict=True)):
@@ -215,10 +215,10 @@ def test_the_cost_of_several_records_is_that_of_the_stage() -> None:
 def test_candidates_that_diverge_are_no_best_ones(method: Any) -> None:
     """Measured records, on which the bounds hold stages that do not stay finite."""
     records = [pt.datasets.dbo_training()[3.0:], pt.datasets.dbo_tracking()[3.0:]]
-    asked: dict[str, Any] = {"history": "virgin", "progress": False}
+    settings: dict[str, Any] = {"history": "virgin", "progress": False}
     seeded = pt.ParticleSwarm(seed=1) if method == "swarm" else pt.Descents(seed=1)
-    fit = pt.identify(records, "first-order-dahl", creep=True, method=seeded, **asked)
-    without = pt.identify(records, "first-order-dahl", method=seeded, **asked)
+    fit = pt.identify(records, "first-order-dahl", creep=True, method=seeded, **settings)
+    without = pt.identify(records, "first-order-dahl", method=seeded, **settings)
     assert 0.5 * without.cost < fit.cost <= without.cost
     assert [one.rms for one in fit.scores] == pytest.approx(
         [one.cost for one in fit.records], rel=1e-3
@@ -258,7 +258,7 @@ def test_of_models_found_by_least_squares_it_is_a_setting() -> None:
 
 
 def test_a_model_file_keeps_it_and_older_ones_have_none(tmp_path: Path) -> None:
-    fit = found(0.3, 4.0)
+    fit = with_creep(0.3, 4.0)
     path = fit.save(tmp_path / "model.json")
     assert pt.load(path).model == fit.model
     content = json.loads(path.read_text())
@@ -269,5 +269,5 @@ def test_a_model_file_keeps_it_and_older_ones_have_none(tmp_path: Path) -> None:
 
 
 def test_the_summary_lists_it() -> None:
-    assert "creep_weights c" in found(0.3, 4.0).summary()
-    assert "creep" not in found().summary()
+    assert "creep_weights c" in with_creep(0.3, 4.0).summary()
+    assert "creep" not in with_creep().summary()

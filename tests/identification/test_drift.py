@@ -42,14 +42,14 @@ def record(
     return pt.Dataset(u=u, y=y, dt=DT)
 
 
-def found(data: Any, **given: Any) -> pt.identification.Identification:
+def with_drift(data: Any, **given: Any) -> pt.identification.Identification:
     asked: dict[str, Any] = {"parameters": HELD, "history": "virgin", "drift": True}
     return pt.identify(data, "dahl", **asked | given)
 
 
 @cache
 def drifting() -> pt.identification.Identification:
-    return found(record(drift=(6e-7, 12.0)))
+    return with_drift(record(drift=(6e-7, 12.0)))
 
 
 def fading(t: NDArray[np.float64], time: float) -> NDArray[np.float64]:
@@ -67,7 +67,7 @@ def test_finds_the_drift_and_the_stage() -> None:
     assert fit.model.stiffness == pytest.approx(STAGE.stiffness, rel=1e-3)
     assert fit.cost == pytest.approx(NOISE, rel=0.03)
     assert fit.fitted.rms == pytest.approx(fit.cost, rel=2e-3)
-    still = found(fit.data, drift=False)
+    still = with_drift(fit.data, drift=False)
     assert still.drift is None
     assert still.cost > 5.0 * fit.cost
 
@@ -75,7 +75,7 @@ def test_finds_the_drift_and_the_stage() -> None:
 @pytest.mark.slow
 def test_the_time_constant_has_a_standard_deviation() -> None:
     """Of twelve records with other noise the time constants spread by it."""
-    fits = [found(record(drift=(6e-7, 12.0), seed=seed)) for seed in range(12)]
+    fits = [with_drift(record(drift=(6e-7, 12.0), seed=seed)) for seed in range(12)]
     estimates = [fit.parameters["drift_time"] for fit in fits]
     away = [(one.value - 12.0) / one.deviation for one in estimates if one.deviation]
     assert len(away) == 12
@@ -90,18 +90,18 @@ def test_the_cost_is_that_of_linear_least_squares(creep: Any) -> None:
     nnls = pytest.importorskip("scipy.optimize").nnls
     stage = replace(STAGE, creep_weights=(0.02, 0.03), creep_times=(0.4, 6.0)) if creep else STAGE
     data = record(drift=(6e-7, 12.0), stage=stage)
-    asked = pt.identification.Objective(
+    objective = pt.identification.Objective(
         data, "dahl", parameters=HELD, drift=True, history="virgin", creep=creep
     )
-    assert list(asked.ranges)[-1] == "drift_time"
-    draws, count = np.random.default_rng(5), len(asked.ranges)
-    ends, costs, _ = asked.descend(draws.uniform(0.3, 0.7, (12, count)))
+    assert list(objective.ranges)[-1] == "drift_time"
+    draws, count = np.random.default_rng(5), len(objective.ranges)
+    ends, costs, _ = objective.descend(draws.uniform(0.3, 0.7, (12, count)))
     places = ends[np.argmin(costs)] + draws.uniform(-2e-3, 2e-3, (6, count))
     places[:, -1] = draws.uniform(0.0, 1.0, 6)
-    low, high = asked.ranges["drift_time"]
-    for place, cost in zip(places, asked(places), strict=True):
+    low, high = objective.ranges["drift_time"]
+    for place, cost in zip(places, objective(places), strict=True):
         time = low * (high / low) ** place[-1]
-        values: dict[str, Any] = asked.parameters(place)
+        values: dict[str, Any] = objective.parameters(place)
         model = pt.DahlStage(**values)
         x = model.simulate(data.u, DT).x
         crept = [
@@ -123,14 +123,14 @@ def test_the_search_ends_at_the_best_time_constant() -> None:
     fit = drifting()
     assert fit.drift is not None
     for factor in (0.97, 1.03):
-        beside = found(fit.data, drift=factor * fit.drift.time)
+        beside = with_drift(fit.data, drift=factor * fit.drift.time)
         assert beside.drift is not None
         assert beside.drift.time == pytest.approx(factor * fit.drift.time)
         assert beside.cost > fit.cost
-    known = found(fit.data, drift=12.0)
+    known = with_drift(fit.data, drift=12.0)
     assert known.cost == pytest.approx(fit.cost, rel=1e-4)
     # A swarm finds the same.
-    swarm = found(fit.data, method=pt.ParticleSwarm(iterations=60, particles=24))
+    swarm = with_drift(fit.data, method=pt.ParticleSwarm(iterations=60, particles=24))
     assert swarm.cost == pytest.approx(fit.cost, rel=1e-6)
 
 
@@ -166,7 +166,7 @@ def test_creep_and_drift_of_several_records() -> None:
         record(drift=(6e-7, 12.0), stage=stage),
         record(drift=(-4e-7, 8.0), stage=stage, seconds=30.0, seed=8),
     ]
-    fit = found(data, creep=(0.4, 6.0))
+    fit = with_drift(data, creep=(0.4, 6.0))
     assert fit.model.creep_weights == pytest.approx((0.02, 0.03), rel=0.03)
     assert fit.cost == pytest.approx(NOISE, rel=0.05)
     for one, size in zip(fit.records, (6e-7, -4e-7), strict=True):
@@ -177,13 +177,13 @@ def test_creep_and_drift_of_several_records() -> None:
 def test_it_goes_on_in_the_file_and_on_other_records(tmp_path: Path) -> None:
     whole = record(drift=(6e-7, 12.0))
     part, rest = whole[0.0:24.0], whole[24.0:]
-    fit = found(part)
+    fit = with_drift(part)
     kept = pt.load(fit.save(tmp_path / "stage.json"))
     assert kept.drift == fit.drift
     assert kept.score(rest, offset=kept.offset).rms == pytest.approx(NOISE, rel=0.2)
     other = record(drift=(-5e-7, 12.0), seed=9)
     assert kept.score(other).rms == pytest.approx(NOISE, rel=0.1)
-    still = found(part, drift=False)
+    still = with_drift(part, drift=False)
     assert still.score(rest, offset=still.offset).rms > 2.0 * NOISE
 
 
@@ -195,7 +195,7 @@ def test_beside_a_history(history: Any) -> None:
     moved = STAGE.simulate(np.concatenate([before, data.u]), DT).x[before.size :]
     alone = STAGE.simulate(data.u, DT).x
     data = pt.Dataset(u=data.u, y=data.y - alone + moved, dt=DT)
-    fit = found(data, history=history)
+    fit = with_drift(data, history=history)
     assert fit.drift is not None
     assert fit.cost < 1.6 * NOISE
     assert fit.drift.amplitude == pytest.approx(6e-7, rel=0.2)
@@ -203,10 +203,10 @@ def test_beside_a_history(history: Any) -> None:
 
 def test_its_values_are_counted() -> None:
     """Size and time constant; the size alone where the time constant is known."""
-    none = found(drifting().data, drift=False).free_count
+    none = with_drift(drifting().data, drift=False).free_count
     assert none is not None
     assert drifting().free_count == none + 2
-    assert found(drifting().data, drift=12.0).free_count == none + 1
+    assert with_drift(drifting().data, drift=12.0).free_count == none + 1
 
 
 @pytest.mark.parametrize("time", [1e-3, 1.0, 30.0, 1e6, 1e18])
@@ -228,13 +228,13 @@ def test_a_drift_is_what_is_left_of_an_exponential(time: float) -> None:
 def test_a_loop_that_is_not_closed_is_no_drift() -> None:
     """Fewer than six reversals: none, unless its time constant is given."""
     data = record(seconds=4.0)
-    assert found(data).drift is None
-    assert found(data, drift=5.0).drift is not None
+    assert with_drift(data).drift is None
+    assert with_drift(data, drift=5.0).drift is not None
 
 
 def test_a_drift_that_is_a_part_of_the_motion_is_said() -> None:
     large = record(drift=(4e-5, 12.0))
-    fit = found(large)
+    fit = with_drift(large)
     assert any("the drift of -38" in note and "% of the stroke" in note for note in fit.notes)
     assert not any("drift" in note for note in drifting().notes)
 
@@ -250,16 +250,16 @@ def test_auto_tries_the_kinds_that_are_searched_too() -> None:
 
 def test_a_checkpoint_is_of_one_drift(tmp_path: Path) -> None:
     data, path = record(drift=(6e-7, 12.0)), tmp_path / "search"
-    first = found(data, checkpoint=path)
-    again = found(data, checkpoint=path)
+    first = with_drift(data, checkpoint=path)
+    again = with_drift(data, checkpoint=path)
     assert (again.cost, again.drift, again.offset) == (first.cost, first.drift, first.offset)
     with pytest.raises(pt.DataError, match="is that of another search"):
-        found(data, drift=12.0, checkpoint=path)
+        with_drift(data, drift=12.0, checkpoint=path)
 
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_the_bits_do_not_depend_on_threads(threads: int) -> None:
-    fit = found(drifting().data, threads=threads)
+    fit = with_drift(drifting().data, threads=threads)
     assert (fit.cost, fit.drift, fit.offset) == (
         drifting().cost,
         drifting().drift,
@@ -277,4 +277,4 @@ def test_the_bits_do_not_depend_on_threads(threads: int) -> None:
 )
 def test_wrong_input_gets_one_sentence(given: dict[str, Any], said: str) -> None:
     with pytest.raises(pt.ParameterError, match=f"^{said}"):
-        found(record(seconds=10.0), **given)
+        with_drift(record(seconds=10.0), **given)

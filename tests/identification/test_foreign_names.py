@@ -68,10 +68,10 @@ def step(name: str, folder: Path) -> Figure:
 
 def path(name: str, folder: Path) -> Figure:
     del folder
-    stage, one = parts()
+    stage, controller = parts()
     circle = pt.circle(frequency=1.0, radius=5e-6, duration=2.0)
     object.__setattr__(circle, "name", name)
-    return pt.contour(stage, (one, one), circle, beyond_reach=True).plot()
+    return pt.contour(stage, (controller, controller), circle, beyond_reach=True).plot()
 
 
 SLOW = [pytest.param(picture, marks=pytest.mark.slow) for picture in (compared, step, path)]

@@ -85,16 +85,48 @@ def test_plays_beyond_half_of_the_range_move_once() -> None:
 def test_a_record_is_searched_again_only_for_a_history_that_it_shows(
     visited: list[float], searched: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = []
+    settings = []
 
     def search(problem: Any, *arguments: Any) -> Any:
-        asked.append(problem.records[0].history)
+        settings.append(problem.records[0].history)
         return search_parameters(problem, *arguments)
 
     monkeypatch.setattr("piezotrack.identification.solve.one_model.search_parameters", search)
     pt.identify(record(visited), "first-order-dahl")
-    assert set(asked) <= set(searched)
-    assert asked[-1] == searched[-1]
+    assert set(settings) <= set(searched)
+    assert settings[-1] == searched[-1]
+
+
+@pytest.mark.parametrize("swarm", [pt.ParticleSwarm.xu_li_2010(), QUICK], ids=["paper", "ring"])
+def test_a_swarm_runs_once_whatever_the_history(swarm: pt.ParticleSwarm) -> None:
+    log, swarm = record([75.0]), replace(swarm, seed=1, runs=2)
+    seen: list[pt.identification.Progress] = []
+    virgin = pt.identify(log, "first-order-dahl", method=swarm, history="virgin")
+    fit = pt.identify(log, "first-order-dahl", method=swarm, callback=seen.append)
+    assert virgin.search is not None
+    assert fit.search is not None
+    assert fit.start is not None
+    assert fit.start.history == "fit"
+    assert fit.cost < 1.1 * NOISE
+    assert (fit.method, fit.nfev, fit.message) == (swarm, virgin.nfev, virgin.message)
+    assert fit.search.runs == virgin.search.runs
+    assert fit.search.history.tolist() == virgin.search.history.tolist()
+    # The rest are descents, which a callback sees too.
+    assert fit.search.npolish - virgin.search.npolish < 3000
+    assert len(seen) > fit.search.nit
+    assert fit.details["fit"]["polish_simulations"] == fit.search.npolish
+    assert f"{fit.cost_um:.4g} um" in fit.summary()
+
+
+def test_a_swarm_keeps_a_history_that_only_a_descent_betters() -> None:
+    # Far from the minimum, as it is not refined.
+    coarse = pt.ParticleSwarm(particles=4, iterations=3, polish=False, runs=1)
+    fits = [
+        pt.identify(record([]), "first-order-dahl", method=coarse, history=history)
+        for history in (None, "virgin")
+    ]
+    assert fits[0].cost == fits[1].cost > 5.0 * NOISE
+    assert fits[0].nfev == fits[1].nfev
 
 
 @pytest.mark.slow

@@ -33,12 +33,12 @@ NAMES = ("mass", "damping", "stiffness", "piezo_coefficient", "a1", "a2", "b1", 
 
 def off(fit: pt.identification.Identification) -> dict[str, float]:
     """How far the ratios that a record fixes are from the true ones, as fractions."""
-    found = fit.model
+    model = fit.model
     return {
-        "D/K": abs(found.damping / found.stiffness * TABLE_1.stiffness / TABLE_1.damping - 1.0),
+        "D/K": abs(model.damping / model.stiffness * TABLE_1.stiffness / TABLE_1.damping - 1.0),
         "T/K": abs(
-            found.piezo_coefficient
-            / found.stiffness
+            model.piezo_coefficient
+            / model.stiffness
             * TABLE_1.stiffness
             / TABLE_1.piezo_coefficient
             - 1.0
@@ -175,16 +175,16 @@ def test_without_a_force_the_scale_is_assumed() -> None:
     )
     assert not known.scale_assumed
     assert "scale assumed" not in known.summary()
-    found = known.model
-    assert found.stiffness == TABLE_1.stiffness
-    assert found.damping == pytest.approx(TABLE_1.damping, rel=0.002)
-    assert found.piezo_coefficient == pytest.approx(TABLE_1.piezo_coefficient, rel=0.002)
-    assert found.b1 == pytest.approx(TABLE_1.b1, rel=0.02)
+    model = known.model
+    assert model.stiffness == TABLE_1.stiffness
+    assert model.damping == pytest.approx(TABLE_1.damping, rel=0.002)
+    assert model.piezo_coefficient == pytest.approx(TABLE_1.piezo_coefficient, rel=0.002)
+    assert model.b1 == pytest.approx(TABLE_1.b1, rel=0.02)
 
     # The scale is free: the same search in other units of force.
     for name in ("damping", "piezo_coefficient", "b1"):
         ratio = getattr(assumed.model, name) / 1e6
-        assert ratio == pytest.approx(getattr(found, name) / TABLE_1.stiffness, rel=1e-5), name
+        assert ratio == pytest.approx(getattr(model, name) / TABLE_1.stiffness, rel=1e-5), name
     assert assumed.cost == pytest.approx(known.cost, rel=1e-9)
 
 
@@ -257,11 +257,11 @@ SWARMS = {
 @pytest.mark.parametrize("name", SWARMS)
 @pytest.mark.parametrize("runs", [1, 3])
 def test_same_seed_same_bits_for_any_number_of_threads(name: str, runs: int) -> None:
-    one = quick_fit(swarm=SWARMS[name], threads=1, runs=runs)
+    single = quick_fit(swarm=SWARMS[name], threads=1, runs=runs)
     for threads in (2, 7, None):
-        assert bits(quick_fit(swarm=SWARMS[name], threads=threads, runs=runs)) == bits(one)
+        assert bits(quick_fit(swarm=SWARMS[name], threads=threads, runs=runs)) == bits(single)
     other = quick_fit(swarm=SWARMS[name], seed=2, runs=runs)
-    assert search_of(other).history.tobytes() != search_of(one).history.tobytes()
+    assert search_of(other).history.tobytes() != search_of(single).history.tobytes()
 
 
 def test_same_seed_same_bits_where_everything_is_free() -> None:

@@ -33,7 +33,7 @@ def fitted(
 ) -> Any:
     """A fit of one record through the core; what is not given is chosen."""
     data = pt.Dataset(u=u, y=y, dt=dt)
-    one = pt.Record(data[float(data.t[start]) :], history=history, drift=drift)
+    record = pt.Record(data[float(data.t[start]) :], history=history, drift=drift)
     settings: dict[str, Any] = {
         "count": None,
         "thresholds": list(PLAIN.thresholds),
@@ -43,7 +43,7 @@ def fitted(
         "start": None,
         "threads": 0,
     }
-    return _core.identify_weights(Problem(model=model, records=(one,)), **settings | given)
+    return _core.identify_weights(Problem(model=model, records=(record,)), **settings | given)
 
 
 def number(fit: Any, name: str) -> float:

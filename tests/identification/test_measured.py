@@ -48,19 +48,19 @@ def fit(seed: int) -> pt.identification.Identification:
 
 
 def test_the_figures_of_the_readme() -> None:
-    found = fit(1)
+    fitted_model = fit(1)
     fitted, _, other = HEADLINE["dahl"]
-    assert found.cost_percent == pytest.approx(fitted, abs=DIGITS)
-    assert found.score(tracking()).rms_percent == pytest.approx(other, abs=DIGITS)
+    assert fitted_model.cost_percent == pytest.approx(fitted, abs=DIGITS)
+    assert fitted_model.score(tracking()).rms_percent == pytest.approx(other, abs=DIGITS)
 
 
 def test_the_model_follows_the_record_and_another_one() -> None:
     # The spread of such fits elsewhere: 0.84 to 0.88 % and 1.67 to 1.80 % of the stroke.
-    found = fit(1)
-    assert found.cost_percent <= 0.90
-    assert found.score(tracking()).rms_percent <= 1.75
-    assert found.stroke == training().stroke
-    assert found.fitted.rms == pytest.approx(found.cost, abs=2e-10)
+    fitted_model = fit(1)
+    assert fitted_model.cost_percent <= 0.90
+    assert fitted_model.score(tracking()).rms_percent <= 1.75
+    assert fitted_model.stroke == training().stroke
+    assert fitted_model.fitted.rms == pytest.approx(fitted_model.cost, abs=2e-10)
 
 
 @pytest.mark.slow
@@ -69,13 +69,13 @@ def test_the_table_of_all_kinds() -> None:
     on_other = pt.compare(log, train=(3.0, 23.0), test=tracking(), seed=1)
     fits = [row.fit for row in on_other.rows]
     on_rest = pt.compare(log, fits, train=(3.0, 23.0))
-    found = {
+    errors = {
         other.name: (other.train.rms_percent, rest.test.rms_percent, other.test.rms_percent)
         for other, rest in zip(on_other.rows, on_rest.rows, strict=True)
     }
-    assert found.keys() == HEADLINE.keys()
+    assert errors.keys() == HEADLINE.keys()
     for name, figures in HEADLINE.items():
-        assert found[name] == pytest.approx(figures, abs=DIGITS), name
+        assert errors[name] == pytest.approx(figures, abs=DIGITS), name
 
 
 def test_it_predicts_cycles_that_were_not_fitted() -> None:
@@ -100,10 +100,10 @@ def test_it_says_what_it_does_not_know() -> None:
 
 def test_the_papers_swarm_does_better_than_a_straight_line() -> None:
     # A line leaves 7.4 % on this record and 5.6 % on the other.
-    found = pt.identify(training(), "dahl", method=pt.ParticleSwarm.xu_li_2010(seed=1))
-    assert search_of(found).npolish == 0
-    assert found.cost_percent < 2.0
-    assert found.score(tracking()).rms_percent < 2.5
+    fit = pt.identify(training(), "dahl", method=pt.ParticleSwarm.xu_li_2010(seed=1))
+    assert search_of(fit).npolish == 0
+    assert fit.cost_percent < 2.0
+    assert fit.score(tracking()).rms_percent < 2.5
 
 
 def test_the_warm_up_counts() -> None:

@@ -60,11 +60,11 @@ def test_a_number_at_the_end_of_float64_is_refused_or_used(case: str, tmp_path: 
     path.write_text(json.dumps(document), encoding="utf-8")
     with suppress(pt.PiezotrackError):
         model = pt.load(path)
-        found: dict[str, Any] = {}
+        states: dict[str, Any] = {}
         for history in ("virgin", "settled", "fit", None):
             with suppress(pt.PiezotrackError):
-                found[str(history)] = model.score(LOG, history=history).rms
-        assert np.isfinite(list(found.values())).all()
+                states[str(history)] = model.score(LOG, history=history).rms
+        assert np.isfinite(list(states.values())).all()
 
 
 def test_what_is_saved_is_what_is_read(tmp_path: Path) -> None:

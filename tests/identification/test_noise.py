@@ -21,23 +21,23 @@ def test_noise_is_found_again_and_given_to_a_stage() -> None:
     """Fig. 3: 0.097 um rms, steps of 0.038 um."""
     assert STAGE.x == ALONG_X
     record = ALONG_X.record(np.zeros(50000), 1 / 5000.0)
-    found = pt.identification.identify_noise(record)
-    assert found.rms == pytest.approx(0.097 * UM, rel=0.02)
-    assert found.resolution == pytest.approx(0.038 * UM, rel=0.01)
-    assert found.bandwidth == pytest.approx(200.0, rel=0.05)
+    noise = pt.identification.identify_noise(record)
+    assert noise.rms == pytest.approx(0.097 * UM, rel=0.02)
+    assert noise.resolution == pytest.approx(0.038 * UM, rel=0.01)
+    assert noise.bandwidth == pytest.approx(200.0, rel=0.05)
     again = pt.identification.identify_noise(
-        found.of_stage(TWIN).record(np.zeros(50000), 1 / 5000.0)
+        noise.of_stage(TWIN).record(np.zeros(50000), 1 / 5000.0)
     )
-    assert again.rms == pytest.approx(found.rms, rel=0.03)
-    assert again.resolution == pytest.approx(found.resolution, rel=1e-6)
+    assert again.rms == pytest.approx(noise.rms, rel=0.03)
+    assert again.resolution == pytest.approx(noise.resolution, rel=1e-6)
     # Parseval: the spectra hold the variance, and the model's is Welch's.
-    f, density = found.spectrum()
-    assert np.sum(density**2) * (f[1] - f[0]) == pytest.approx(found.rms**2, rel=0.05)
+    f, density = noise.spectrum()
+    assert np.sum(density**2) * (f[1] - f[0]) == pytest.approx(noise.rms**2, rel=0.05)
     for low, high in ((20, 100), (300, 600), (1500, 2400)):
         part = (f > low) & (f < high)
-        ratio = np.mean(density[part] ** 2) / np.mean(found.density(f[part]) ** 2)
+        ratio = np.mean(density[part] ** 2) / np.mean(noise.density(f[part]) ** 2)
         assert ratio == pytest.approx(1.0, abs=0.15)
-    figure = found.plot()
+    figure = noise.plot()
     figure.canvas.draw()
     assert [ax.get_xlabel() for ax in figure.axes] == ["time [ms]", "frequency [Hz]"]
     plt.close(figure)
@@ -48,12 +48,12 @@ def test_the_grid_is_found_where_few_levels_show() -> None:
     for step, noise in ((0.15 * UM, 0.1 * UM), (0.01 * UM, 0.1 * UM)):
         y = step * np.round(random.normal(3 * UM, noise, 5000) / step)
         log = pt.Dataset(u=np.zeros(5000), y=y, dt=1e-3)
-        found = pt.identification.identify_noise(log)
-        assert found.resolution == pytest.approx(step, rel=1e-6)
-        assert found.noise == pytest.approx(noise, rel=0.1)
-        assert found.bandwidth_sd is None
-        assert math.isinf(found.bandwidth)
-        assert "white" in found.summary()
+        sensor = pt.identification.identify_noise(log)
+        assert sensor.resolution == pytest.approx(step, rel=1e-6)
+        assert sensor.noise == pytest.approx(noise, rel=0.1)
+        assert sensor.bandwidth_sd is None
+        assert math.isinf(sensor.bandwidth)
+        assert "white" in sensor.summary()
 
 
 def test_a_record_that_moves_is_not_at_rest() -> None:

@@ -38,24 +38,24 @@ def deviation(values: Array) -> float:
 
 def minimum(cost: Callable[[Array], float], around: Array) -> Array:
     """The minimum of a cost of values that are a few per cent of some others apart."""
-    found = minimize(
+    minimised = minimize(
         lambda z: cost(around * (1.0 + 0.01 * z)),
         np.zeros(around.size),
         method="Nelder-Mead",
         options={"xatol": 1e-6, "fatol": 1e-10, "maxiter": 4000, "maxfev": 4000},
     )
-    assert found.success
-    values: Array = around * (1.0 + 0.01 * found.x)
+    assert minimised.success
+    values: Array = around * (1.0 + 0.01 * minimised.x)
     return values
 
 
 def alike(fit: pt.identification.Identification, other: pt.identification.Identification) -> None:
     """Assert that two fits found the same values, and are as sure of them."""
     for name in SEARCHED:
-        one, same = fit.parameters[name], other.parameters[name]
-        assert one.deviation is not None
-        assert one.value == pytest.approx(same.value, abs=0.01 * one.deviation)
-        assert one.deviation == pytest.approx(same.deviation, rel=1e-3)
+        estimate, same = fit.parameters[name], other.parameters[name]
+        assert estimate.deviation is not None
+        assert estimate.value == pytest.approx(same.value, abs=0.01 * estimate.deviation)
+        assert estimate.deviation == pytest.approx(same.deviation, rel=1e-3)
 
 
 # Ties.
@@ -191,7 +191,7 @@ def test_a_prior_is_weighed_against_the_record_as_scipy_does() -> None:
         return len(quick()) * math.log(deviation(values)) + 0.5 * prior
 
     around = np.array([fit.parameters[name].value for name in SEARCHED])
-    found = minimum(objective, around)
+    lowest = minimum(objective, around)
     # The curvature of minus the logarithm of the posterior, by differences over a twentieth of the
     # deviations, as the parameters are correlated.
     deviations = [fit.parameters[name].deviation for name in SEARCHED]
@@ -200,7 +200,7 @@ def test_a_prior_is_weighed_against_the_record_as_scipy_does() -> None:
 
     def second(i: int, j: int) -> float:
         signs = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
-        total: float = sum(s * objective(found + a * at[i] + b * at[j]) for a, b, s in signs)
+        total: float = sum(s * objective(lowest + a * at[i] + b * at[j]) for a, b, s in signs)
         return total / (4.0 * float(steps[i]) * float(steps[j]))
 
     curvature = np.array([[second(i, j) for j in range(3)] for i in range(3)])
@@ -208,7 +208,7 @@ def test_a_prior_is_weighed_against_the_record_as_scipy_does() -> None:
     for i, name in enumerate(SEARCHED):
         one = fit.parameters[name]
         assert one.deviation == pytest.approx(spread[i], rel=0.05)
-        assert one.value == pytest.approx(found[i], abs=0.02 * spread[i])
+        assert one.value == pytest.approx(lowest[i], abs=0.02 * spread[i])
     # It is between the two, and the record alone is not.
     free = quick_fit(fixed=FIXED, bounds=bounds)
     assert mean + 10.0 < fit.model.stiffness < free.model.stiffness - 10.0
@@ -351,7 +351,7 @@ def test_the_file_keeps_what_was_said(tmp_path: Path) -> None:
 
 
 def test_threads_make_no_difference() -> None:
-    def found(threads: int) -> tuple[str, str]:
+    def tied_fit(threads: int) -> tuple[str, str]:
         fit = quick_fit(
             fixed=HELD,
             bounds={name: BOX[name] for name in ("damping", "stiffness")},
@@ -362,7 +362,7 @@ def test_threads_make_no_difference() -> None:
         )
         return repr(fit.model), fit.cost.hex()
 
-    assert found(1) == found(2)
+    assert tied_fit(1) == tied_fit(2)
 
 
 # Refusals.
@@ -427,11 +427,11 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 
 @pytest.mark.parametrize(("arguments", "message"), REFUSED)
 def test_refuses_in_one_sentence(arguments: dict[str, Any], message: str) -> None:
-    said = {"fixed": F} | arguments
-    constraints = said.pop("constraints", None)
+    text = {"fixed": F} | arguments
+    constraints = text.pop("constraints", None)
     with pytest.raises(pt.ParameterError, match=message) as caught:
         pt.identify(
-            quick(), "dahl", parameters=entries(**said), constraints=constraints, method=SMALL
+            quick(), "dahl", parameters=entries(**text), constraints=constraints, method=SMALL
         )
     assert "\n" not in str(caught.value)
 

@@ -148,11 +148,11 @@ def test_the_commands_take_it() -> None:
     # What the piezo is asked for brings about what was wanted.
     assert np.ptp(pt.load(model).simulate(drive).x[500:]) == pytest.approx(35e-6, rel=0.01)
     paper = ("--stage", "xu-li-2010")
-    said = refusal("track", model, "--reference", "sine:1Hz,5..40um", *paper)
-    assert said.startswith("prandtl-ishlinskii.json: the drive of this model is a position")
+    message = refusal("track", model, "--reference", "sine:1Hz,5..40um", *paper)
+    assert message.startswith("prandtl-ishlinskii.json: the drive of this model is a position")
     Path("volts.csv").write_text("time_s,voltage_V\n0,0\n1,1\n2,0\n3,1\n", encoding="utf-8")
-    said = refusal("simulate", "results/prandtl-ishlinskii.json", "volts.csv")
-    assert said.startswith("volts.csv: the drive is in V: expected um")
+    message = refusal("simulate", "results/prandtl-ishlinskii.json", "volts.csv")
+    assert message.startswith("volts.csv: the drive is in V: expected um")
 
 
 @pytest.mark.usefixtures("_no_pictures")
@@ -179,10 +179,10 @@ def test_closed_loops_take_it() -> None:
     assert 0.0 <= rows["drive_um"].min() < 20.0 < rows["drive_um"].max() <= 45.0
     late = rows["time_s"] > 2.0
     assert np.abs(rows["desired_um"] - rows["measured_um"])[late].max() < 0.5
-    said = refusal("track", model, *course[:2], "--kp", "900", "--ti", "0.02", "--overwrite")
-    assert re.search(r"on this stage, [\d.]+ um/um; at the limit kp would be [\d.]+ um/um", said)
-    said = refusal("track", model, "--reference", "sine:1Hz,5..400um", "--overwrite")
-    assert re.search(r"which this stage reaches from [\d.]+ to [\d.]+ um", said)
+    match = refusal("track", model, *course[:2], "--kp", "900", "--ti", "0.02", "--overwrite")
+    assert re.search(r"on this stage, [\d.]+ um/um; at the limit kp would be [\d.]+ um/um", match)
+    match = refusal("track", model, "--reference", "sine:1Hz,5..400um", "--overwrite")
+    assert re.search(r"which this stage reaches from [\d.]+ to [\d.]+ um", match)
     two = ("contour", model, "--path", "circle:1Hz,5um", "--kp", "0.1", "--ti", "0.02")
     assert not re.search(r"\bV\b", ran(*two, "--dt", "0.002"))
 

@@ -59,14 +59,14 @@ def test_the_share_of_several_records_is_that_of_all_their_windows() -> None:
 
 @pytest.mark.usefixtures("_no_pictures")
 @pytest.mark.parametrize(
-    ("window", "said"), [(":1.5", " s, fitted:"), ("1:2", " s, 50"), ("1.6:", " s, not fitted")]
+    ("window", "message"), [(":1.5", " s, fitted:"), ("1:2", " s, 50"), ("1.6:", " s, not fitted")]
 )
 def test_validation_says_which_share_was_fitted(
-    window: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    window: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_log(log(), Path("log.csv"))
     arguments = ("identify", "log.csv", "--window", ":1.5", "--model", "prandtl-ishlinskii")
     done = run(*arguments, "--validate", "log.csv", "--validate-window", window)
     line = next(one for one in done.output.splitlines() if one.startswith("on log.csv"))
-    assert said in line, done.output
+    assert message in line, done.output

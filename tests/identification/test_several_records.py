@@ -86,7 +86,7 @@ def both() -> pt.identification.Identification:
     return pt.identify([slow(), quick()], **ASKED)
 
 
-def own(records: list[pt.Dataset], **values: Any) -> list[pt.Record]:
+def with_each(records: list[pt.Dataset], **values: Any) -> list[pt.Record]:
     """Records with arguments of their own, each in a list."""
     each = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
     return [
@@ -117,16 +117,16 @@ def test_two_records_determine_what_neither_does_alone() -> None:
     assert alone[0].parameters["mass"].deviation == np.inf
     assert errors(alone[0])["mass"] > 0.5
     assert (alone[1].parameters["b1"].deviation or 0.0) > 0.03 * STAGE.b1
-    found, least = errors(both()), {"mass": 5e-4, "damping": 2e-3, "b1": 2e-3}
-    assert found["piezo_coefficient"] < 3e-4
+    off, least = errors(both()), {"mass": 5e-4, "damping": 2e-3, "b1": 2e-3}
+    assert off["piezo_coefficient"] < 3e-4
     for name, most in least.items():
-        assert found[name] < most, name
+        assert off[name] < most, name
         estimate = both().parameters[name]
         assert estimate.identified
         assert estimate.deviation is not None
         # The deviations say how far the values are off, and so they are normal ones.
         assert abs(estimate.value - getattr(STAGE, name)) < 4.0 * estimate.deviation, name
-    assert errors(alone[0])["damping"] > 5.0 * found["damping"]
+    assert errors(alone[0])["damping"] > 5.0 * off["damping"]
     assert both().cost == pytest.approx(NOISE, rel=0.05)
 
 
@@ -138,7 +138,7 @@ def test_the_cost_is_the_weighted_rms_of_all_samples() -> None:
     # Unequal windows and weights, on a model that does not fit them.
     parts = [slow()[0.4:2.0], quick()]
     given = OF_STAGE | {"parameters": ASKED["parameters"] | {"b1": 0.0}}
-    fit = pt.identify(own(parts, weight=[3.0, 0.5]), **given)
+    fit = pt.identify(with_each(parts, weight=[3.0, 0.5]), **given)
     assert fit.records[0].cost > 10.0 * NOISE
     assert fit.cost == pytest.approx(weighted(fit, [3.0, 0.5]), rel=1e-3)
     assert [one.weight for one in fit.records] == [3.0, 0.5]
@@ -154,11 +154,11 @@ def test_each_record_has_its_own_score_offset_and_stroke() -> None:
     )
     assert [one.stroke for one in fit.records] == [slow().stroke, quick().stroke]
     assert fit.stroke == slow().stroke
-    for one, score, data in zip(fit.records, fit.scores, (slow(), quick()), strict=True):
-        assert score.rms == pytest.approx(one.cost, rel=1e-3)
+    for fitted, score, data in zip(fit.records, fit.scores, (slow(), quick()), strict=True):
+        assert score.rms == pytest.approx(fitted.cost, rel=1e-3)
         assert score.stroke == data.stroke
         # A record that was fitted is known again, and gets the offset that suits it.
-        assert fit.score(data).offset == pytest.approx(one.offset, abs=1e-10)
+        assert fit.score(data).offset == pytest.approx(fitted.offset, abs=1e-10)
         assert fit.fitted_on(data)
     assert fit.drive_range == (min(quick().u), max(slow().u))
 
@@ -175,14 +175,16 @@ def test_no_state_goes_from_one_record_to_the_next() -> None:
     costs = [one.cost for one in fit.records]
     assert [one.cost for one in reversed(other_way.records)] == pytest.approx(costs, rel=1e-6)
     # The same model alone on each record: nothing of the other is in its score.
-    for one in fit.records:
-        assert one.data is not None
-        assert one.start is not None
-        assert one.start.state.x == 0.0
+    for fitted in fit.records:
+        assert fitted.data is not None
+        assert fitted.start is not None
+        assert fitted.start.state.x == 0.0
         alone = pt.identification.IdentifiedModel(
-            model=fit.model, offset=one.offset, offset_fitted=True, stroke=one.stroke
+            model=fit.model, offset=fitted.offset, offset_fitted=True, stroke=fitted.stroke
         )
-        assert alone.score(one.data, history="virgin").rms == pytest.approx(one.cost, rel=1e-3)
+        assert alone.score(fitted.data, history="virgin").rms == pytest.approx(
+            fitted.cost, rel=1e-3
+        )
     # Were the second one simulated from where the first one ended, it would be far off.
     end = fit.model.simulate(ends_high.u, ends_high.dt).final
     carried = fit.score(quick(), initial=replace(end, v=0.0))
@@ -195,9 +197,9 @@ def test_offsets_and_delays_of_their_own() -> None:
     u = u - u[0]
     first = record(u, dt, seed=3)
     second = record(0.7 * u[::-1] - 0.7 * u[-1], dt, offset=3e-6, late=5, seed=4)
-    asked = ASKED | {"parameters": ASKED["parameters"] | {"b1": STAGE.b1}}
-    of_stage = OF_STAGE | {"parameters": asked["parameters"]}
-    fit = pt.identify(own([first, second], delay=[0.0, True]), **of_stage)
+    settings = ASKED | {"parameters": ASKED["parameters"] | {"b1": STAGE.b1}}
+    of_stage = OF_STAGE | {"parameters": settings["parameters"]}
+    fit = pt.identify(with_each([first, second], delay=[0.0, True]), **of_stage)
     assert [one.delay for one in fit.records] == [0.0, pytest.approx(5e-3, abs=2e-5)]
     assert [one.offset for one in fit.records] == pytest.approx([0.0, 3e-6], abs=1e-8)
     assert fit.delay == 0.0
@@ -210,12 +212,14 @@ def test_offsets_and_delays_of_their_own() -> None:
         assert one.data is not None
         assert fit.score(one.data).rms == pytest.approx(one.cost, rel=1e-2)
     # One delay for both, or no offset, is worse.
-    assert pt.identify([first, second], delay=0.0, **asked).cost > 5.0 * fit.cost
-    fixed = pt.identify(own([first, second], delay=[0.0, 5e-3], offset=[True, False]), **of_stage)
+    assert pt.identify([first, second], delay=0.0, **settings).cost > 5.0 * fit.cost
+    fixed = pt.identify(
+        with_each([first, second], delay=[0.0, 5e-3], offset=[True, False]), **of_stage
+    )
     assert fixed.records[1].offset == 0.0
     assert fixed.records[1].cost > 2e-6
     # As the records are, also where both delays are fitted.
-    free = pt.identify([second, first], delay=True, **asked)
+    free = pt.identify([second, first], delay=True, **settings)
     assert [one.delay for one in free.records] == pytest.approx([5e-3, 0.0], abs=2e-5)
 
 
@@ -225,9 +229,9 @@ def test_histories_of_their_own() -> None:
         record(u, 4e-3, seed=5),
         record(u, 4e-3, seed=6, initial=STAGE.equilibrium([60.0, 0.0])),
     ]
-    asked = ASKED | {"parameters": ASKED["parameters"] | {"mass": STAGE.mass}}
-    own_history = {name: value for name, value in asked.items() if name != "history"}
-    fit = pt.identify(own(records, history=["virgin", "fit"]), **own_history)
+    settings = ASKED | {"parameters": ASKED["parameters"] | {"mass": STAGE.mass}}
+    own_history = {name: value for name, value in settings.items() if name != "history"}
+    fit = pt.identify(with_each(records, history=["virgin", "fit"]), **own_history)
     assert [one.start.history for one in fit.records if one.start] == ["virgin", "fit"]
     assert "voltage_before" not in fit.parameters
     assert fit.records[1].parameters["voltage_before"].value == pytest.approx(60.0, abs=2.0)
@@ -235,38 +239,38 @@ def test_histories_of_their_own() -> None:
     for one in fit.records:
         assert one.data is not None
         assert fit.score(one.data).rms == pytest.approx(one.cost, rel=1e-2)
-    wrong = pt.identify(records, **asked | {"history": "virgin"})
+    wrong = pt.identify(records, **settings | {"history": "virgin"})
     assert wrong.records[1].cost > 2.0 * fit.records[1].cost
     # The same where nothing is said: what each record shows.
-    shown = pt.identify(records, **asked | {"history": None})
+    shown = pt.identify(records, **settings | {"history": None})
     assert [one.start.history for one in shown.records if one.start] == ["virgin", "fit"]
     assert shown.cost == pytest.approx(fit.cost, rel=1e-3)
 
 
 def test_a_weight_of_two_is_a_record_given_twice() -> None:
-    heavy = pt.identify(own([slow(), quick()], weight=[2.0, 1.0]), **OF_STAGE)
+    heavy = pt.identify(with_each([slow(), quick()], weight=[2.0, 1.0]), **OF_STAGE)
     twice = pt.identify([slow(), slow(), quick()], **ASKED)
     assert heavy.cost == pytest.approx(twice.cost, rel=1e-9)
     for name in SEARCHED:
         assert getattr(heavy.model, name) == pytest.approx(getattr(twice.model, name), rel=1e-6)
     # Only ratios matter, and a large weight is nearly the record alone.
-    tenfold = pt.identify(own([slow(), quick()], weight=(20, 10)), **OF_STAGE)
+    tenfold = pt.identify(with_each([slow(), quick()], weight=(20, 10)), **OF_STAGE)
     assert tenfold.cost == pytest.approx(heavy.cost, rel=1e-12)
     alone = pt.identify(quick(), **ASKED)
-    most = pt.identify(own([slow(), quick()], weight=[1e-9, 1.0]), **OF_STAGE)
+    most = pt.identify(with_each([slow(), quick()], weight=[1e-9, 1.0]), **OF_STAGE)
     assert most.model.mass == pytest.approx(alone.model.mass, rel=1e-5)
 
 
 def test_a_list_of_one_is_that_record() -> None:
-    one, listed = (
+    alone, listed = (
         pt.identify(slow(), **ASKED),
         pt.identify([pt.Record(slow(), history="virgin", weight=2.0)], **OF_STAGE),
     )
-    assert listed.model == one.model
-    assert listed.cost == one.cost
-    assert len(one.records) == 1
-    assert one.records[0].data is slow()
-    assert (one.records[0].cost, one.records[0].offset) == (one.cost, one.offset)
+    assert listed.model == alone.model
+    assert listed.cost == alone.cost
+    assert len(alone.records) == 1
+    assert alone.records[0].data is slow()
+    assert (alone.records[0].cost, alone.records[0].offset) == (alone.cost, alone.offset)
 
 
 def test_the_same_bits_on_any_number_of_threads_and_by_a_swarm() -> None:
@@ -291,7 +295,8 @@ def test_priors_enter_once() -> None:
     assert minimised > pulled.cost == pytest.approx(both().cost, rel=0.01)
     # Weights are shares: the same for both change nothing.
     again = pt.identify(
-        own([slow(), quick()], weight=[7.0, 7.0]), **OF_STAGE | {"parameters": given["parameters"]}
+        with_each([slow(), quick()], weight=[7.0, 7.0]),
+        **OF_STAGE | {"parameters": given["parameters"]},
     )
     assert again.model.damping == pytest.approx(pulled.model.damping, rel=1e-9)
 
@@ -300,13 +305,17 @@ def test_a_file_keeps_the_records(tmp_path: Path) -> None:
     dt = 1e-3
     u = multisine(1000, dt, 0.5)
     first, second = record(u - u[0], dt, seed=3), record(u - u[0], dt, late=5, seed=4)
-    fit = pt.identify(own([first, second], delay=[0.0, 5e-3], weight=[1, 2]), **OF_STAGE)
+    fit = pt.identify(with_each([first, second], delay=[0.0, 5e-3], weight=[1, 2]), **OF_STAGE)
     path = fit.save(tmp_path / "two.json")
     read = pt.load(path)
-    for one, kept in zip(fit.records, read.records, strict=True):
+    for fitted, kept in zip(fit.records, read.records, strict=True):
         assert kept.data is None
-        assert (kept.weight, kept.delay, kept.offset) == (one.weight, one.delay, one.offset)
-        assert (kept.start, kept.cost, kept.stroke) == (one.start, one.cost, one.stroke)
+        assert (kept.weight, kept.delay, kept.offset) == (
+            fitted.weight,
+            fitted.delay,
+            fitted.offset,
+        )
+        assert (kept.start, kept.cost, kept.stroke) == (fitted.start, fitted.cost, fitted.stroke)
     for data in (first, second, first[0.2:0.7]):
         assert read.score(data) == fit.score(data)
         assert np.array_equal(read.simulate(data).x, fit.simulate(data).x)
@@ -324,7 +333,7 @@ def test_a_file_keeps_the_records(tmp_path: Path) -> None:
 
 def test_a_file_with_broken_records_is_refused(tmp_path: Path) -> None:
     document = both().document()
-    for change, said in (
+    for change, message in (
         ({"records": 3}, "two.json: records is int: expected a list of records"),
         ({"records": [{}, {}]}, "two.json: the entry 'weight' is missing"),
     ):
@@ -332,7 +341,7 @@ def test_a_file_with_broken_records_is_refused(tmp_path: Path) -> None:
         path.write_text(json.dumps(document | change), encoding="utf-8")
         with pytest.raises(pt.DataError, match=r"two\.json") as caught:
             pt.load(path)
-        assert str(caught.value) == said
+        assert str(caught.value) == message
     document["records"][1]["delay"]["unit"] = "ms"
     path.write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(
@@ -396,7 +405,7 @@ def test_a_search_of_several_goes_on_from_its_checkpoint(tmp_path: Path) -> None
 def test_windows_of_one_log_are_told_apart() -> None:
     log = record(large(1500), 4e-3, seed=7)
     late = pt.Dataset(u=log.u, y=log.y, dt=log.dt)
-    fit = pt.identify(own([log[0.0:2.0], late[3.0:5.0]], offset=[True, False]), **OF_STAGE)
+    fit = pt.identify(with_each([log[0.0:2.0], late[3.0:5.0]], offset=[True, False]), **OF_STAGE)
     for window, i in ((log[0.5:1.5], 0), (log[3.5:4.5], 1), (log[3.0:5.0], 1)):
         assert fit.score(window).stroke == fit.records[i].stroke
     # No offset where none was fitted.
@@ -412,10 +421,10 @@ def test_a_lag_that_fits_at_two_rates_is_not_said_to_hold_at_one() -> None:
 
     # Another kind of stage than the one that made them, so that the residual is not white.
     asked: dict[str, Any] = {"model": "bouc-wen", "history": "virgin", "progress": False}
-    for records, said in (([at(0.5), at(0.5, 1200)], True), ([at(0.5), at(2.0)], False)):
+    for records, message in (([at(0.5), at(0.5, 1200)], True), ([at(0.5), at(2.0)], False)):
         fit = pt.identify(records, **asked)
         assert fit.lags is not None
-        assert any("holds at this rate only" in note for note in fit.notes) == said
+        assert any("holds at this rate only" in note for note in fit.notes) == message
 
 
 def of_force() -> pt.Dataset:
@@ -447,23 +456,23 @@ def identified(records: Any, given: dict[str, Any]) -> pt.identification.Identif
         (lambda: [slow(), still()], {}, r"record 2 \(dead.csv\): the displacement is constant"),
         (lambda: [slow(), quick()[0.0:0.003]], {}, "record 2: the window has 6 samples"),
         (
-            lambda: own([slow(), quick()], weight=[1.0, 0.0]),
+            lambda: with_each([slow(), quick()], weight=[1.0, 0.0]),
             {},
             "record 2: weight is 0: expected a finite number above 0",
         ),
-        (lambda: own([slow(), quick()], weight=[1.0, -2.0]), {}, "record 2: weight is -2"),
-        (lambda: own([slow(), quick()], weight=[np.nan, 1.0]), {}, "record 1: weight is NaN"),
-        (lambda: own([slow(), quick()], weight=[1.0, "x"]), {}, "weight is 'x'"),
+        (lambda: with_each([slow(), quick()], weight=[1.0, -2.0]), {}, "record 2: weight is -2"),
+        (lambda: with_each([slow(), quick()], weight=[np.nan, 1.0]), {}, "record 1: weight is NaN"),
+        (lambda: with_each([slow(), quick()], weight=[1.0, "x"]), {}, "weight is 'x'"),
         (lambda: pt.Record(slow()), {"delay": True}, "delay is True: expected it in pt.Record"),
         (lambda: [slow(), quick()], {"delay": [0.0, 0.1, 0.2]}, "bounds of delay are"),
-        (lambda: own([slow(), quick()], delay=[0.0, -1.0]), {}, "record 2: delay is -1"),
-        (lambda: own([slow(), quick()], delay=[0.0, "x"]), {}, "delay is 'x'"),
+        (lambda: with_each([slow(), quick()], delay=[0.0, -1.0]), {}, "record 2: delay is -1"),
+        (lambda: with_each([slow(), quick()], delay=[0.0, "x"]), {}, "delay is 'x'"),
         (
-            lambda: own([slow(), quick()], history=["virgin", "old"]),
+            lambda: with_each([slow(), quick()], history=["virgin", "old"]),
             {},
             "history is 'old': expected 'virgin', 'settled', 'fit'",
         ),
-        (lambda: own([slow(), quick()], offset=[True, 3]), {}, "offset is 3"),
+        (lambda: with_each([slow(), quick()], offset=[True, 3]), {}, "offset is 3"),
         (lambda: [slow(), quick()], {"creep": [1.0, 0.0]}, r"creep\[1\] is 0 s: expected"),
         (
             lambda: [slow(), quick()[0.0:0.1]],
@@ -476,12 +485,12 @@ def identified(records: Any, given: dict[str, Any]) -> pt.identification.Identif
             "parameters is {.*: expected none with the model 'prandtl-ishlinskii'",
         ),
         (
-            lambda: own([slow(), quick()], drift=[None, True], offset=[True, False]),
+            lambda: with_each([slow(), quick()], drift=[None, True], offset=[True, False]),
             {},
             "drift is True: expected none with offset=False",
         ),
         (
-            lambda: own([slow(), quick()], drift=[None, -2.0]),
+            lambda: with_each([slow(), quick()], drift=[None, -2.0]),
             {},
             "drift is -2: expected a finite number above 0, in s",
         ),

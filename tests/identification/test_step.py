@@ -150,10 +150,10 @@ def test_a_second_level_tells_stiffness_and_piezo_coefficient(stiffness: float) 
     # Creeping up to 40 V, the model says where another step would end.
     u = np.minimum(np.arange(9000) / 6000.0, 1.0) * 40.0
     level = known.model.simulate(u, 1e-3).x[-1]
-    found = pt.identify_step(known.readings, second_level=(40.0, level))
-    assert found.stiffness == pytest.approx(stiffness, rel=0.02)
-    assert found.piezo_coefficient == pytest.approx(known.piezo_coefficient, rel=0.02)
-    assert "second static level" in found.summary()
+    step = pt.identify_step(known.readings, second_level=(40.0, level))
+    assert step.stiffness == pytest.approx(stiffness, rel=0.02)
+    assert step.piezo_coefficient == pytest.approx(known.piezo_coefficient, rel=0.02)
+    assert "second static level" in step.summary()
 
 
 def test_a_second_level_may_be_a_step_of_its_own() -> None:
@@ -197,10 +197,10 @@ def test_a_noisy_step_gives_frequency_and_damping(seed: int) -> None:
 @pytest.mark.parametrize("rate", [2500.0, 5000.0, 50000.0])
 def test_a_clean_step_is_read_exactly(zeta: float, rate: float) -> None:
     step = pt.identify_step(step_log(zeta=zeta, rate=rate, seconds=0.1 / zeta**0.5))
-    found = step.readings
+    readings = step.readings
     assert step.damping_by_decrement == pytest.approx(zeta, rel=0.01)
-    assert found.frequency == pytest.approx(160.0 * math.sqrt(1 - 2 * zeta**2), rel=2e-3)
-    assert found.resonance_gain / found.static_gain == pytest.approx(
+    assert readings.frequency == pytest.approx(160.0 * math.sqrt(1 - 2 * zeta**2), rel=2e-3)
+    assert readings.resonance_gain / readings.static_gain == pytest.approx(
         1.0 / (2 * zeta * math.sqrt(1 - zeta**2)), rel=0.02
     )
     # The peaks lie at odd multiples of half a period.
@@ -228,11 +228,11 @@ def test_a_step_down_and_a_stage_that_goes_the_other_way() -> None:
     down = pt.Dataset(u=75.0 - up_log.u, y=STEADY - up_log.y, dt=up_log.dt, hold="zoh")
     other = pt.Dataset(u=up_log.u, y=5e-6 - up_log.y, dt=up_log.dt, hold="zoh")
     for log, sign in ((down, 1.0), (other, -1.0)):
-        found = pt.identify_step(log)
-        assert found.readings.frequency == pytest.approx(up.readings.frequency)
-        assert found.damping_ratio == pytest.approx(up.damping_ratio)
-        assert found.hysteresis["a1"] == pytest.approx(up.hysteresis["a1"])
-        assert found.ratios["T/K"] == pytest.approx(sign * up.ratios["T/K"])
+        step = pt.identify_step(log)
+        assert step.readings.frequency == pytest.approx(up.readings.frequency)
+        assert step.damping_ratio == pytest.approx(up.damping_ratio)
+        assert step.hysteresis["a1"] == pytest.approx(up.hysteresis["a1"])
+        assert step.ratios["T/K"] == pytest.approx(sign * up.ratios["T/K"])
 
 
 def test_a_drive_that_was_measured_need_not_be_clean() -> None:

@@ -84,8 +84,10 @@ class Meaning:
                 return self.node(node.operand)
             case ast.BinOp() if type(node.op) in BINARY:
                 return float(BINARY[type(node.op)](self.node(node.left), self.node(node.right)))
-            case ast.Call(func=ast.Name(id=name), args=[one], keywords=[]) if name in FUNCTIONS:
-                return FUNCTIONS[name](self.node(one))
+            case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if (
+                name in FUNCTIONS
+            ):
+                return FUNCTIONS[name](self.node(argument))
             case _:
                 raise SyntaxError(ast.dump(node))
 

@@ -72,11 +72,11 @@ def test_two_records_share_a_stage_and_nothing_else() -> None:
     assert second.offset == pytest.approx(-1e-6, abs=2e-8)
     assert second.drift is not None
     assert second.drift.amplitude == pytest.approx(4e-7, abs=2e-8)
-    for one in fit.records:
-        assert one.cost == pytest.approx(NOISE, rel=0.05)
+    for fitted in fit.records:
+        assert fitted.cost == pytest.approx(NOISE, rel=0.05)
     # The scores are those of the same simulation, each with its own offset, drift and start.
-    for one, score in zip(fit.records, fit.scores, strict=True):
-        assert score.rms == pytest.approx(one.cost, rel=1e-6)
+    for fitted, score in zip(fit.records, fit.scores, strict=True):
+        assert score.rms == pytest.approx(fitted.cost, rel=1e-6)
     both = (len(slow) * first.cost**2 + len(quick) * second.cost**2) / (len(slow) + len(quick))
     assert fit.cost == pytest.approx(both**0.5, rel=1e-9)
 

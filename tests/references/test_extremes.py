@@ -19,7 +19,7 @@ RANGE: dict[str, Any] = {"low": 0.0, "high": 1e-4}
 LOG = pt.Dataset(u=np.arange(500.0), y=np.arange(500.0) * 1e-6, dt=0.001)
 
 
-def own(motion: Callable[[Any], Any]) -> pt.Reference:
+def moving(motion: Callable[[Any], Any]) -> pt.Reference:
     return pt.Reference(name="mine", duration=1.0, low=0.0, high=1e-5, motion=motion)
 
 
@@ -28,10 +28,10 @@ NOT_FINITE: dict[str, tuple[Callable[[], pt.Reference], str]] = {
     "rise": (lambda: pt.staircase(steps=2, dwell=1.0, rise=1e-301, **RANGE), "staircase"),
     "steep": (lambda: pt.staircase(steps=2, dwell=1.0, rise=1e-200, **RANGE), "staircase"),
     "nan": (
-        lambda: own(lambda t: (np.where(t > 0.55, np.nan, t), t, t)),
+        lambda: moving(lambda t: (np.where(t > 0.55, np.nan, t), t, t)),
         "mine is nan m, .* at 0.6",
     ),
-    "infinite": (lambda: own(lambda t: (t, t, t / (t - 0.5))), "mine is 0.5 m, .* at 0.5"),
+    "infinite": (lambda: moving(lambda t: (t, t, t / (t - 0.5))), "mine is 0.5 m, .* at 0.5"),
 }
 
 
@@ -61,8 +61,8 @@ def test_a_motion_that_is_not_finite_is_refused_with_its_time(name: str) -> None
 
 
 def test_the_path_of_such_a_motion_is_refused_too() -> None:
-    bad = own(lambda t: (np.where(t > 0.5, np.nan, t), t, np.where(t > 0.5, np.nan, t)))
-    path = pt.XYReference(name="path", x=own(lambda t: (t, t, t)), y=bad)
+    bad = moving(lambda t: (np.where(t > 0.5, np.nan, t), t, np.where(t > 0.5, np.nan, t)))
+    path = pt.XYReference(name="path", x=moving(lambda t: (t, t, t)), y=bad)
     with pytest.raises(pt.ParameterError, match=r"^motion of mine is nan m"):
         path.errors([0.0], [0.0])
 
@@ -82,12 +82,12 @@ def test_a_motion_must_return_three_arrays(motion: Callable[[Any], Any]) -> None
     with pytest.raises(
         pt.ParameterError, match=r"^motion of mine returns .*: expected displacement"
     ):
-        own(motion).sample(0.1)
+        moving(motion).sample(0.1)
 
 
 def test_a_simulation_of_such_a_motion_is_refused_too() -> None:
     loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-    reference = own(lambda t: (np.where(t > 0.5, np.nan, 1e-5 * t), 1e-5 * t, t))
+    reference = moving(lambda t: (np.where(t > 0.5, np.nan, 1e-5 * t), 1e-5 * t, t))
     with pytest.raises(pt.ParameterError, match=r"^motion of mine is nan m"):
         pt.track(pt.DahlStage.xu_li_2010(), loop, reference)
 

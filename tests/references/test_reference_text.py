@@ -118,11 +118,11 @@ TEXTS: dict[str, pt.Reference] = {
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_reads_a_text(text: str) -> None:
-    found, expected = pt.parse_reference(text), TEXTS[text]
-    assert (found.name, repr(found)) == (expected.name, repr(expected))
-    assert found.duration == pytest.approx(expected.duration, rel=1e-14)
-    assert found.ramp == pytest.approx(expected.ramp, rel=1e-14)
-    one, other = found.sample(0.01), expected.sample(0.01)
+    parsed, expected = pt.parse_reference(text), TEXTS[text]
+    assert (parsed.name, repr(parsed)) == (expected.name, repr(expected))
+    assert parsed.duration == pytest.approx(expected.duration, rel=1e-14)
+    assert parsed.ramp == pytest.approx(expected.ramp, rel=1e-14)
+    one, other = parsed.sample(0.01), expected.sample(0.01)
     np.testing.assert_allclose(one.x, other.x, rtol=0.0, atol=1e-17)
 
 

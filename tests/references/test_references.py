@@ -240,11 +240,11 @@ def test_a_multisine_has_its_lines_and_no_others() -> None:
     )
     assert reference.period == 2.0
     samples = reference.sample(0.01)
-    found = 2.0 * np.abs(np.fft.rfft(samples.x)) / len(samples)
+    lines = 2.0 * np.abs(np.fft.rfft(samples.x)) / len(samples)
     at = (np.array(LINES) * 8.0).astype(int)
-    np.testing.assert_allclose(found[at], sizes_um * UM, rtol=1e-12)
-    assert found[0] / 2.0 == pytest.approx(20e-6, rel=1e-12)
-    assert np.delete(found, [0, *at]).max() < 1e-18
+    np.testing.assert_allclose(lines[at], sizes_um * UM, rtol=1e-12)
+    assert lines[0] / 2.0 == pytest.approx(20e-6, rel=1e-12)
+    assert np.delete(lines, [0, *at]).max() < 1e-18
 
 
 def test_amplitudes_as_ratios_keep_their_order() -> None:
@@ -264,11 +264,11 @@ def test_schroeders_phases_are_flatter_than_equal_ones() -> None:
 
 
 def test_a_seed_gives_the_same_phases() -> None:
-    one, same, other = (
+    first, same, other = (
         pt.multisine(frequencies=LINES, seed=seed, **RANGE).sample(0.01).x for seed in (1, 1, 2)
     )
-    assert np.array_equal(one, same)
-    assert not np.allclose(one, other)
+    assert np.array_equal(first, same)
+    assert not np.allclose(first, other)
 
 
 def test_a_multisine_that_does_not_repeat_in_time_has_no_period() -> None:

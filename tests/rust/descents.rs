@@ -3,6 +3,7 @@
 
 use core::ops::ControlFlow;
 
+use piezotrack_core::Error;
 use piezotrack_core::identify::{
     DescentSettings, Identification, Method, Plan, Progress, Record, Spec, StopReason, identify,
 };
@@ -25,13 +26,15 @@ fn spec() -> Spec {
 }
 
 fn found(settings: &DescentSettings, seed: u64, runs: usize, threads: usize) -> Identification {
+    let plan = Plan { method: Method::Descents(settings.clone()), seed, runs, start: None };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| by(&plan).unwrap())
+}
+
+fn by(plan: &Plan) -> piezotrack_core::Result<Identification> {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 0).unwrap();
-    let spec = spec();
-    let plan = Plan { method: Method::Descents(settings.clone()), seed, runs };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let mut quiet = |_: &Progress| ControlFlow::Continue(());
-    pool.install(|| identify(&record, &spec, &plan, &mut quiet, NEVER).unwrap())
+    identify(&record, &spec(), plan, &mut |_: &Progress| ControlFlow::Continue(()), NEVER)
 }
 
 fn bits(found: &Identification) -> Vec<Vec<u64>> {
@@ -74,6 +77,27 @@ fn rounds_go_on_until_as_many_agree_as_were_asked_for() {
 }
 
 #[test]
+fn a_descent_starts_at_the_place_that_is_given() {
+    let best = found(&DescentSettings::default(), 1, 1, 2);
+    let best = &best.runs[best.best.unwrap()];
+    let settings = DescentSettings { samples: 1, starts: 1, agreeing: 2, rounds: 2 };
+    let plan = |start: &[f64]| Plan {
+        method: Method::Descents(settings.clone()),
+        seed: 1,
+        runs: 1,
+        start: Some(start.to_vec()),
+    };
+    let again = by(&plan(&best.place)).unwrap();
+    // In the first round only, in which there is room for no other.
+    assert!(again.runs[0].history[0] <= 1.001 * best.costs.rms.max(1e-13));
+    assert!(again.runs.len() == 1 || again.runs[1].history[0] > 1e3 * again.runs[0].history[0]);
+    let outside = vec![2.0; best.place.len()];
+    for place in [&best.place[1..], &[][..], &outside] {
+        assert!(matches!(by(&plan(place)), Err(Error::Parameter { .. })), "{place:?}");
+    }
+}
+
+#[test]
 fn settings_that_cannot_be_used_are_named() {
     let fine = DescentSettings::default();
     let refused = [
@@ -95,7 +119,7 @@ fn a_search_that_is_stopped_keeps_its_best() {
     let record = Record::new(&u, &y, DT, Hold::First, 0).unwrap();
     let spec = spec();
     let method = Method::Descents(DescentSettings::default());
-    let plan = Plan { method, seed: 1, runs: 1 };
+    let plan = Plan { method, seed: 1, runs: 1, start: None };
     let mut last = f64::INFINITY;
     let mut third = |progress: &Progress| {
         last = progress.cost;

@@ -32,7 +32,7 @@ fn spec() -> Spec {
 
 fn plan() -> Plan {
     let settings = DescentSettings { samples: 12, starts: 6, ..DescentSettings::default() };
-    Plan { method: Method::Descents(settings), seed: 1, runs: 1 }
+    Plan { method: Method::Descents(settings), seed: 1, runs: 1, start: None }
 }
 
 fn together(asked: &[(&Record<'_>, &Spec)]) -> Identification {

@@ -120,7 +120,7 @@ fn memory_that_cannot_be_had_is_an_error_with_its_size() {
 fn particles_of_all_runs_together_are_bounded() {
     let plan = |particles, runs| {
         let settings = SwarmSettings { particles, ..SwarmSettings::xu_li_2010() };
-        Plan { method: identify::Method::Swarm(settings), seed: 1, runs }.validate()
+        Plan { method: identify::Method::Swarm(settings), seed: 1, runs, start: None }.validate()
     };
     assert_eq!(plan(100_000, 1), Ok(()));
     assert_eq!(plan(100, 10_000), Ok(()));

@@ -154,10 +154,10 @@ def test_identification_finds_the_parameters(tmp_path: Path) -> None:
     assert pt.load(fit.save(tmp_path / "model.json")).model == fit.model
     assert "epsilon" in fit.summary()
     # One asymmetry is searched without being asked for, the other is held at 0.
-    asked = pt.identify(log[:2.0], "asymmetric-bouc-wen", method=pt.Descents(seed=2))
-    assert asked.parameters["asymmetry"].free
-    assert not asked.parameters["sign_asymmetry"].free
-    assert asked.model.sign_asymmetry == 0.0
+    settings = pt.identify(log[:2.0], "asymmetric-bouc-wen", method=pt.Descents(seed=2))
+    assert settings.parameters["asymmetry"].free
+    assert not settings.parameters["sign_asymmetry"].free
+    assert settings.model.sign_asymmetry == 0.0
 
 
 @pytest.mark.parametrize("name", ["asymmetry", "sign_asymmetry", "mass", "beta"])

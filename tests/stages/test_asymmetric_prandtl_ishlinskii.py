@@ -135,12 +135,12 @@ def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = wandering(3000)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
     settings = LeastSquares(thresholds=STAGE.thresholds, creep=False, dynamics=None)
-    found = pt.identify(log, NAME, method=settings)
-    assert found.cost < 1e-12
-    assert found.offset == pytest.approx(-4e-6, abs=1e-9)
-    assert (found.model.low, found.model.high) == (0.0, 75.0)
+    fit = pt.identify(log, NAME, method=settings)
+    assert fit.cost < 1e-12
+    assert fit.offset == pytest.approx(-4e-6, abs=1e-9)
+    assert (fit.model.low, fit.model.high) == (0.0, 75.0)
     for prefix in FAMILIES:
-        weights = getattr(found.model, f"{prefix}weights")
+        weights = getattr(fit.model, f"{prefix}weights")
         expected = getattr(STAGE, f"{prefix}weights")
         np.testing.assert_allclose(weights, expected, rtol=0.0, atol=1e-10)
 
@@ -182,10 +182,10 @@ def test_a_measured_loop_is_wider_on_one_side() -> None:
 
 def test_it_is_saved_and_tracks(tmp_path: Path) -> None:
     fit = measured().fits[NAME]
-    found = pt.load(fit.save(tmp_path / "stage.json"))
-    assert found.model == fit.model
+    loaded = pt.load(fit.save(tmp_path / "stage.json"))
+    assert loaded.model == fit.model
     reference = pt.sine(frequency=1.0, low=8e-6, high=35e-6, duration=4.0)
-    inverse = found.model.inverse(playback="online")
+    inverse = loaded.model.inverse(playback="online")
     loop = pt.Controller(dt=1e-3, limits=(0.0, 3.6), feedforward=inverse)
-    run = pt.track(found.model, loop, reference)
+    run = pt.track(loaded.model, loop, reference)
     assert run.metrics.rms_error < 0.1e-6

@@ -95,12 +95,12 @@ def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = wandering(3000)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
     settings = LeastSquares(creep=False, dynamics=None)
-    found = pt.identify(log, "duhem", method=settings)
-    assert found.cost < 1e-9
-    assert found.offset == pytest.approx(-4e-6, abs=1e-8)
-    assert found.model.alpha == pytest.approx(STAGE.alpha, rel=0.01)
+    fit = pt.identify(log, "duhem", method=settings)
+    assert fit.cost < 1e-9
+    assert fit.offset == pytest.approx(-4e-6, abs=1e-8)
+    assert fit.model.alpha == pytest.approx(STAGE.alpha, rel=0.01)
     again = np.linspace(70.0, 5.0, 300)
-    moved = found.model.simulate(again, 1e-3).x - STAGE.simulate(again, 1e-3).x
+    moved = fit.model.simulate(again, 1e-3).x - STAGE.simulate(again, 1e-3).x
     assert np.abs(moved).max() < 1e-8
 
 
@@ -120,10 +120,10 @@ def test_it_explains_a_measured_log_and_foretells_another(tmp_path: Path) -> Non
     # Its loops are asymmetric, those of Bouc and Wen are not.
     assert bent.train.rms_percent < symmetric.train.rms_percent
     fit = compared.fits["duhem"]
-    found = pt.load(fit.save(tmp_path / "stage.json"))
-    assert found.model == fit.model
+    loaded = pt.load(fit.save(tmp_path / "stage.json"))
+    assert loaded.model == fit.model
     reference = pt.sine(frequency=1.0, low=10e-6, high=35e-6, duration=4.0)
-    inverse = found.model.inverse(playback="online")
+    inverse = loaded.model.inverse(playback="online")
     loop = pt.Controller(dt=1e-3, limits=(0.0, 3.6), feedforward=inverse)
-    run = pt.track(found.model, loop, reference)
+    run = pt.track(loaded.model, loop, reference)
     assert run.metrics.rms_error < 0.1e-6

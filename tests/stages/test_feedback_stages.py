@@ -84,7 +84,7 @@ def reference(
             moving = state[1] if abs(state[1]) > 1e-14 else (a if abs(a) > 1e-12 else jerk)
             sign = 1.0 if moving >= 0 else -1.0
             turning.direction = -sign  # type: ignore[attr-defined]
-            found = solve_ivp(
+            solution = solve_ivp(
                 rhs,
                 (now, dt),
                 state,
@@ -94,8 +94,8 @@ def reference(
                 atol=[1e-14, 1e-12, 1e-11],
                 events=turning,
             )
-            state, now = found.y[:, -1], found.t[-1]
-            if found.status == 1:
+            state, now = solution.y[:, -1], solution.t[-1]
+            if solution.status == 1:
                 state[1] = 0.0
         x.append(float(state[0]))
     return np.array(x)

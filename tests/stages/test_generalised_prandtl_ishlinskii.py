@@ -134,13 +134,13 @@ def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = 37.5 * (1.0 - fall * np.cos(2.0 * np.pi * phase))
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
     settings = LeastSquares(thresholds=STAGE.thresholds, dynamics=None)
-    found = pt.identify(log, NAME, method=settings)
-    assert found.cost < 5e-9
-    assert found.offset == pytest.approx(-4e-6, abs=1e-8)
+    fit = pt.identify(log, NAME, method=settings)
+    assert fit.cost < 5e-9
+    assert fit.offset == pytest.approx(-4e-6, abs=1e-8)
     # Linear, four weights, slope, shift, two shares of the creep and the offset.
-    assert found.free_count == 10
+    assert fit.free_count == 10
     again = np.linspace(75.0, 0.0, 300)
-    moved = found.model.simulate(again, 1e-3).x - STAGE.simulate(again, 1e-3).x
+    moved = fit.model.simulate(again, 1e-3).x - STAGE.simulate(again, 1e-3).x
     assert np.abs(moved).max() < 5e-8
 
 
@@ -171,11 +171,11 @@ def test_it_has_a_row_beside_the_others_on_a_measured_log() -> None:
 
 def test_a_model_file_and_a_controller_take_it_as_any_stage(tmp_path: Path) -> None:
     fit = measured().fits[NAME]
-    found = pt.load(fit.save(tmp_path / "stage.json"))
-    assert found.model == fit.model
+    loaded = pt.load(fit.save(tmp_path / "stage.json"))
+    assert loaded.model == fit.model
     reference = pt.sine(frequency=1.0, low=5e-6, high=35e-6, duration=4.0)
     # Along the whole run: a table of one period does not know creep that goes on.
-    inverse = found.model.inverse(playback="online")
+    inverse = loaded.model.inverse(playback="online")
     loop = pt.Controller(dt=1e-3, limits=(0.0, 3.6), feedforward=inverse)
-    run = pt.track(found.model, loop, reference)
+    run = pt.track(loaded.model, loop, reference)
     assert run.metrics.rms_error < 0.1e-6

@@ -246,12 +246,12 @@ def test_scheme_is_fourth_order_across_reversals() -> None:
     # Each accuracy that is asked for ends with a number of sub-steps; the errors fall with them.
     stage = stage_of(p)
     runs = [stage.simulate(u, dt, accuracy=10.0**power) for power in np.arange(-5.0, -14.0, -0.5)]
-    found = {run.substeps: float(np.abs(run.x - x).max()) for run in runs}
-    halvings, errors = np.log2(list(found)), np.array(list(found.values()))
+    errors_of = {run.substeps: float(np.abs(run.x - x).max()) for run in runs}
+    halvings, errors = np.log2(list(errors_of)), np.array(list(errors_of.values()))
     used = (errors < 1e-8) & (errors > 1e-14)
-    assert np.count_nonzero(used) >= 3, found
+    assert np.count_nonzero(used) >= 3, errors_of
     slope = -np.polyfit(halvings[used], np.log2(errors[used]), 1)[0]
-    assert slope >= 3.7, found
+    assert slope >= 3.7, errors_of
 
 
 # Closed forms.

@@ -30,7 +30,7 @@ STAGE = pt.MaxwellSlipStage(
 def balanced(stage: pt.MaxwellSlipStage, u: Array) -> Array:
     """Displacement at which springs and elements balance the drive, voltage by voltage [m]."""
     ratios, slips = np.array(stage.stiffness_ratios), np.array(stage.slip_displacements)
-    strain, x, found = np.zeros(ratios.size), 0.0, []
+    strain, x, displacements = np.zeros(ratios.size), 0.0, []
 
     def rest(to: float, drive: float) -> float:
         force = to + float(ratios @ np.clip(strain + to - x, -slips, slips))
@@ -41,8 +41,8 @@ def balanced(stage: pt.MaxwellSlipStage, u: Array) -> Array:
             brentq(rest, x - 1e-3, x + 1e-3, args=(float(drive),), xtol=1e-18, rtol=1e-14)
         )
         strain, x = np.clip(strain + there - x, -slips, slips), there
-        found.append(x)
-    return np.array(found)
+        displacements.append(x)
+    return np.array(displacements)
 
 
 def test_springs_and_elements_balance_the_drive() -> None:
@@ -67,7 +67,7 @@ def test_it_is_the_stage_of_these_plays() -> None:
         "frequency": 200.0,
         "damping_ratio": 0.1,
     }
-    one = pt.MaxwellSlipStage(
+    single = pt.MaxwellSlipStage(
         piezo_coefficient=gain, stiffness_ratios=(ratio,), slip_displacements=(slip,), **moving
     )
     plays = pt.PrandtlIshlinskiiStage(
@@ -78,7 +78,7 @@ def test_it_is_the_stage_of_these_plays() -> None:
     )
     u = multisine(2000, 1e-3, 2.0)
     np.testing.assert_allclose(
-        one.simulate(u, 1e-3).x, plays.simulate(u, 1e-3).x, rtol=0, atol=1e-16
+        single.simulate(u, 1e-3).x, plays.simulate(u, 1e-3).x, rtol=0, atol=1e-16
     )
 
 

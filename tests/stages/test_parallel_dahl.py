@@ -62,7 +62,7 @@ def reference(stage: pt.ParallelDahlStage, u: Array, dt: float, hold: str) -> Ar
             moving = state[1] if abs(state[1]) > 1e-14 else (a if abs(a) > 1e-12 else rate)
             sign = 1.0 if moving >= 0 else -1.0
             turning.direction = -sign  # type: ignore[attr-defined]
-            found = solve_ivp(
+            solution = solve_ivp(
                 rhs,
                 (now, dt),
                 state,
@@ -72,8 +72,8 @@ def reference(stage: pt.ParallelDahlStage, u: Array, dt: float, hold: str) -> Ar
                 atol=[1e-14, 1e-12, 1e-11, 1e-11, 1e-11],
                 events=turning,
             )
-            state, now = found.y[:, -1], found.t[-1]
-            if found.status == 1:
+            state, now = solution.y[:, -1], solution.t[-1]
+            if solution.status == 1:
                 state[1] = 0.0
         x.append(float(state[0]))
     return np.array(x)
@@ -93,7 +93,7 @@ def test_against_an_independent_solver(hold: str) -> None:
 def test_elements_with_equal_paths_are_one() -> None:
     """Whose rest stiffness and Coulomb force are the sums."""
     equal = dataclasses.replace(STAGE, path_ratio=1.0)
-    one = pt.FirstOrderDahlStage(
+    joined = pt.FirstOrderDahlStage(
         mass=STAGE.mass,
         damping=STAGE.damping,
         stiffness=STAGE.stiffness,
@@ -102,7 +102,7 @@ def test_elements_with_equal_paths_are_one() -> None:
         coulomb_force=sum(equal.coulomb_forces),
     )
     u, dt = slow_drive(2000, 1e-3), 1e-3
-    many, single = equal.simulate(u, dt), one.simulate(u, dt)
+    many, single = equal.simulate(u, dt), joined.simulate(u, dt)
     assert many.substeps == single.substeps
     np.testing.assert_allclose(many.x, single.x, rtol=0, atol=1e-17)
     np.testing.assert_allclose(many.hysteresis, single.hysteresis, rtol=0, atol=1e-14)
@@ -114,7 +114,7 @@ def test_elements_without_force_do_nothing(others: tuple[int, int]) -> None:
     (left,) = {1, 2, 3} - {*others}
     none: dict[str, Any] = {f"rest_stiffness_{j}": 0.0 for j in others}
     alone = dataclasses.replace(STAGE, **none)
-    one = pt.FirstOrderDahlStage(
+    without = pt.FirstOrderDahlStage(
         mass=STAGE.mass,
         damping=STAGE.damping,
         stiffness=STAGE.stiffness,
@@ -123,7 +123,9 @@ def test_elements_without_force_do_nothing(others: tuple[int, int]) -> None:
         coulomb_force=STAGE.coulomb_forces[left - 1],
     )
     u, dt = slow_drive(500, 1e-3), 1e-3
-    np.testing.assert_allclose(alone.simulate(u, dt).x, one.simulate(u, dt).x, rtol=0, atol=1e-16)
+    np.testing.assert_allclose(
+        alone.simulate(u, dt).x, without.simulate(u, dt).x, rtol=0, atol=1e-16
+    )
 
 
 def test_loops_close_and_dissipate() -> None:

@@ -261,15 +261,15 @@ def test_the_number_of_values_fitted_counts_the_offset() -> None:
 
 def test_a_file_gives_back_the_same_bits(tmp_path: Path) -> None:
     fit = fitted()
-    found = pt.load(fit.save(tmp_path / "pi.json"))
-    assert found.model == fit.model
-    assert (found.offset, found.stroke, found.offset_fitted) == (fit.offset, fit.stroke, True)
-    again = found.save(tmp_path / "again.json")
+    loaded = pt.load(fit.save(tmp_path / "pi.json"))
+    assert loaded.model == fit.model
+    assert (loaded.offset, loaded.stroke, loaded.offset_fitted) == (fit.offset, fit.stroke, True)
+    again = loaded.save(tmp_path / "again.json")
     assert again.read_bytes() == (tmp_path / "pi.json").read_bytes()
     document = json.loads(again.read_text())
     assert document["schema_version"] == 2
     assert document["parameters"]["weights"]["unit"] == "m/V"
-    assert pickle.loads(pickle.dumps(found)) == found
+    assert pickle.loads(pickle.dumps(loaded)) == loaded
 
 
 BROKEN: dict[str, tuple[Any, str]] = {

@@ -90,13 +90,13 @@ def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = wandering(3000)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
     settings = LeastSquares(thresholds=STAGE.thresholds, creep=False, dynamics=None)
-    found = pt.identify(log, NAME, method=settings)
-    assert found.cost < 1e-12
-    assert found.offset == pytest.approx(-4e-6, abs=1e-9)
+    fit = pt.identify(log, NAME, method=settings)
+    assert fit.cost < 1e-12
+    assert fit.offset == pytest.approx(-4e-6, abs=1e-9)
     for name in ("a1", "a2", "a3", "low", "high"):
         expected = getattr(STAGE, name)
-        assert getattr(found.model, name) == pytest.approx(expected, rel=1e-3, abs=1e-15)
-    np.testing.assert_allclose(found.model.weights, STAGE.weights, rtol=0.0, atol=1e-10)
+        assert getattr(fit.model, name) == pytest.approx(expected, rel=1e-3, abs=1e-15)
+    np.testing.assert_allclose(fit.model.weights, STAGE.weights, rtol=0.0, atol=1e-10)
 
 
 def test_it_has_a_row_beside_the_others_on_a_measured_log(tmp_path: Path) -> None:
@@ -108,10 +108,10 @@ def test_it_has_a_row_beside_the_others_on_a_measured_log(tmp_path: Path) -> Non
     assert plain.train.rms_percent < bent.train.rms_percent < 1.5 * plain.train.rms_percent
     assert bent.test.rms_percent < 1.0
     fit = compared.fits[NAME]
-    found = pt.load(fit.save(tmp_path / "stage.json"))
-    assert found.model == fit.model
+    loaded = pt.load(fit.save(tmp_path / "stage.json"))
+    assert loaded.model == fit.model
     reference = pt.sine(frequency=1.0, low=5e-6, high=35e-6, duration=4.0)
-    inverse = found.model.inverse(playback="online")
+    inverse = loaded.model.inverse(playback="online")
     loop = pt.Controller(dt=1e-3, limits=(0.0, 3.6), feedforward=inverse)
-    run = pt.track(found.model, loop, reference)
+    run = pt.track(loaded.model, loop, reference)
     assert run.metrics.rms_error < 0.1e-6

@@ -104,12 +104,12 @@ def test_the_inverse_undoes_the_stage_along_any_path(stage: pt.PreisachStage) ->
 def test_a_record_gives_back_the_stage_that_made_it() -> None:
     u = wandering(3000)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, 1e-3).x - 4e-6, dt=1e-3)
-    found = pt.identify(log, "preisach", method=SETTINGS)
+    fit = pt.identify(log, "preisach", method=SETTINGS)
     # Neighbouring masses are drawn together by a trace.
-    assert found.cost < 1e-10
-    assert found.offset == pytest.approx(-4e-6, abs=1e-9)
+    assert fit.cost < 1e-10
+    assert fit.offset == pytest.approx(-4e-6, abs=1e-9)
     again = np.concatenate([np.linspace(75.0, 10.0, 300), np.linspace(10.0, 40.0, 300)])
-    moved = found.model.simulate(again, 1e-3).x - STAGE.simulate(again, 1e-3).x
+    moved = fit.model.simulate(again, 1e-3).x - STAGE.simulate(again, 1e-3).x
     assert np.abs(moved).max() < 5e-9
 
 
@@ -163,10 +163,10 @@ def test_it_explains_a_measured_log_and_foretells_another(tmp_path: Path) -> Non
     assert relay.train.rms_percent < 2.0 * plain.train.rms_percent
     assert relay.test.rms_percent < 2.0 * plain.test.rms_percent
     fit = compared.fits["preisach"]
-    found = pt.load(fit.save(tmp_path / "stage.json"))
-    assert found.model == fit.model
+    loaded = pt.load(fit.save(tmp_path / "stage.json"))
+    assert loaded.model == fit.model
     reference = pt.sine(frequency=1.0, low=5e-6, high=35e-6, duration=4.0)
-    inverse = found.model.inverse(playback="online")
+    inverse = loaded.model.inverse(playback="online")
     loop = pt.Controller(dt=1e-3, limits=(0.0, 3.6), feedforward=inverse)
-    run = pt.track(found.model, loop, reference)
+    run = pt.track(loaded.model, loop, reference)
     assert run.metrics.rms_error < 0.1e-6

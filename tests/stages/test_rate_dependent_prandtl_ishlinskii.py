@@ -119,13 +119,13 @@ def test_records_at_three_rates_determine_it() -> None:
     settings = pt.identification.LeastSquares(
         thresholds=STAGE.thresholds, dead_zones=False, creep=False, dynamics=None
     )
-    asked: dict[str, Any] = {"history": "virgin", "drift": False, "method": settings}
-    fit = pt.identify(logs, KIND, **asked)
+    options: dict[str, Any] = {"history": "virgin", "drift": False, "method": settings}
+    fit = pt.identify(logs, KIND, **options)
     assert fit.model.dilation == pytest.approx(STAGE.dilation, rel=0.01)
     assert fit.model.weights == pytest.approx(STAGE.weights, rel=0.02)
     assert fit.cost == pytest.approx(NOISE, rel=0.05)
     # Without rate dependence the three contradict each other, with a lag too.
-    plain = pt.identify(logs, "prandtl-ishlinskii", **asked)
+    plain = pt.identify(logs, "prandtl-ishlinskii", **options)
     late = replace(settings, dynamics="first")
     lagging = pt.identify(logs, "prandtl-ishlinskii", history="virgin", drift=False, method=late)
     assert plain.cost > lagging.cost > 10.0 * fit.cost

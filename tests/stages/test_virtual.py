@@ -80,10 +80,10 @@ def test_the_noise_at_rest_is_the_published_one() -> None:
 
 def test_the_same_seed_gives_the_same_reading_and_no_other_does() -> None:
     u = np.linspace(0.0, 10.0, 500)
-    one, again = STAGE.simulate(u, FAST), pt.VirtualStage.xu_li_2010(seed=1).simulate(u, FAST)
+    first, again = STAGE.simulate(u, FAST), pt.VirtualStage.xu_li_2010(seed=1).simulate(u, FAST)
     other = pt.VirtualStage.xu_li_2010(seed=2).simulate(u, FAST)
-    assert one.y.tobytes() == again.y.tobytes() != other.y.tobytes()
-    assert one.x.tobytes() == other.x.tobytes()
+    assert first.y.tobytes() == again.y.tobytes() != other.y.tobytes()
+    assert first.x.tobytes() == other.x.tobytes()
 
 
 def test_shapes_units_and_times() -> None:

@@ -35,12 +35,12 @@ def test_table_1_tells_the_sign_of_the_asymmetry() -> None:
         fig_06_identification.thinned(fig_06_identification.record(apparatus_at(one)), 10)
         for one in (theta, turned)
     ]
-    found, other = (
+    stiffness, other = (
         fig_06_identification.observe(fig_06_identification.search(log, 1))["table_1.stiffness"]
         for log in logs
     )
-    assert found == pytest.approx(26065.0, rel=0.25)
-    assert other > 1.3 * found
+    assert stiffness == pytest.approx(26065.0, rel=0.25)
+    assert other > 1.3 * stiffness
 
 
 def test_what_agrees_costs_nothing() -> None:
@@ -83,34 +83,34 @@ def test_each_free_parameter_is_one_of_the_apparatus() -> None:
     theta = {one["name"]: one["value"] for one in calibration_file()["free"]}
     assert sorted(theta) == sorted(one.name for one in FREE)
     known = apparatus_at(theta).document()
-    for one in FREE:
-        assert one.low <= theta[one.name] <= one.high
+    for parameter in FREE:
+        assert parameter.low <= theta[parameter.name] <= parameter.high
         # x and y have their own, but for what they share.
-        moved = apparatus_at({**theta, one.name: one.at(0.37)}).document()
+        moved = apparatus_at({**theta, parameter.name: parameter.at(0.37)}).document()
         changed = {key for key in known if moved[key] != known[key]}
-        if one.name.endswith(("_x", "_y")) and not one.name.startswith("cross"):
-            assert changed == {one.name[-1]}, one.name
+        if parameter.name.endswith(("_x", "_y")) and not parameter.name.startswith("cross"):
+            assert changed == {parameter.name[-1]}, parameter.name
         else:
-            assert changed, one.name
+            assert changed, parameter.name
 
 
 @pytest.mark.slow
 def test_a_calibration_goes_from_end_to_end() -> None:
     seen: list[float] = []
-    found = calibrate(
+    calibration = calibrate(
         particles=2, iterations=1, runs=1, progress=lambda _, least, __: seen.append(least)
     )
     # Three swarms, each told twice. The last is judged by medians over three seeds, as the best
     # before it then is, and the better of the two is described.
     assert len(seen) == 6
-    told = found["provenance"]
-    assert told["costs"][0] == seen[1]
-    assert told["costs"][1] <= min(seen[1], seen[3])
-    assert told["cost"] == told["costs"][2] <= seen[5]
-    assert told["sensor_seeds"] == [1, 2, 3]
-    obtained = {one["key"]: one["obtained"] for one in found["observables"]}
-    assert cost(obtained) == pytest.approx(told["cost"], rel=1e-9)
-    assert Apparatus.of(found["apparatus"]).document() == found["apparatus"]
+    provenance = calibration["provenance"]
+    assert provenance["costs"][0] == seen[1]
+    assert provenance["costs"][1] <= min(seen[1], seen[3])
+    assert provenance["cost"] == provenance["costs"][2] <= seen[5]
+    assert provenance["sensor_seeds"] == [1, 2, 3]
+    obtained = {one["key"]: one["obtained"] for one in calibration["observables"]}
+    assert cost(obtained) == pytest.approx(provenance["cost"], rel=1e-9)
+    assert Apparatus.of(calibration["apparatus"]).document() == calibration["apparatus"]
 
 
 def test_the_swarm_finds_the_bottom_of_a_bowl() -> None:

@@ -46,16 +46,16 @@ def test_the_published_numbers_are_those_of_the_paper() -> None:
 
 
 def test_what_was_to_be_left_out_is() -> None:
-    for one in observables():
-        left_out = one.figure[:2] in ("13", "14") or one.key.startswith("circle.40um")
+    for observable in observables():
+        left_out = observable.figure[:2] in ("13", "14") or observable.key.startswith("circle.40um")
         # And what no record at 0.25 Hz tells.
-        left_out = left_out or one.key == "table_1.mass"
+        left_out = left_out or observable.key == "table_1.mass"
         # A ratio of two published numbers is neither.
-        derived = one.key.endswith(".ratio")
+        derived = observable.key.endswith(".ratio")
         left_out = left_out and not derived
-        assert (one.use == "left out") == left_out, one.key
-        assert (one.use == "derived") == derived, one.key
-        assert one.calibrated != (left_out or derived), one.key
+        assert (observable.use == "left out") == left_out, observable.key
+        assert (observable.use == "derived") == derived, observable.key
+        assert observable.calibrated != (left_out or derived), observable.key
     fitted = {entry["key"] for entry in calibration_file().get("observables", [])}
     assert fitted <= {one.key for one in observables() if one.calibrated}
 
@@ -91,10 +91,10 @@ def test_goals() -> None:
 
 
 def test_medians_and_quartiles_of_a_hand_made_array() -> None:
-    found = Obtained(observable=made("value", 2.0, calibrated=True), values=(1.0, 5.0, 2.0, 4.0))
-    assert found.median == 3.0
-    assert found.quartiles == (1.75, 4.25)
-    assert found.ratio == 1.5
+    obtained = Obtained(observable=made("value", 2.0, calibrated=True), values=(1.0, 5.0, 2.0, 4.0))
+    assert obtained.median == 3.0
+    assert obtained.quartiles == (1.75, 4.25)
+    assert obtained.ratio == 1.5
 
 
 def test_what_is_put_in_is_what_the_stage_is_set_to() -> None:
@@ -163,15 +163,15 @@ def test_seeds_are_refused(seeds: int) -> None:
 def test_the_way_on_the_measured_log() -> None:
     if not MEASURED.is_dir():
         pytest.skip(f"the measured logs are not in {MEASURED}")
-    found = drives(MEASURED)
-    off = {name: found.computed[name] - found.measured for name in found.computed}
-    line = np.sqrt(np.mean((found.line - found.measured) ** 2))
+    comparison = drives(MEASURED)
+    off = {name: comparison.computed[name] - comparison.measured for name in comparison.computed}
+    line = np.sqrt(np.mean((comparison.line - comparison.measured) ** 2))
     # A line through their drive leaves 180 mV; every inverse explains most of that.
     assert line == pytest.approx(0.1795, abs=1e-3)
     for name, error in off.items():
         assert np.sqrt(np.mean(error**2)) < 0.55 * line, name
         assert abs(error.mean()) < 1e-12
-    assert len(found.section().rows) == 4
+    assert len(comparison.section().rows) == 4
 
 
 def test_a_missing_log_is_named(tmp_path: Path) -> None:

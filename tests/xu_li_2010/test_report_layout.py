@@ -30,15 +30,15 @@ def test_a_table_is_not_split_and_pages_are_filled_alike(
     sizes: tuple[int, ...], expected: int
 ) -> None:
     lines = [line for i, size in enumerate(sizes) for line in block(f"{i}", size)]
-    found = pages(lines)
-    assert len(found) == expected
+    filled = pages(lines)
+    assert len(filled) == expected
     # Nothing is lost, and the order is kept.
-    kept = [line for page in found for line in page if line]
+    kept = [line for page in filled for line in page if line]
     assert kept == [line for line in lines if line]
-    assert all(len(page) <= LINES for page in found)
+    assert all(len(page) <= LINES for page in filled)
     for i, size in enumerate(sizes):
         if size <= LINES:
-            assert sum(any(line.startswith(f"{i} ") for line in page) for page in found) == 1
+            assert sum(any(line.startswith(f"{i} ") for line in page) for page in filled) == 1
 
 
 def test_pages_are_filled_alike() -> None:

@@ -43,11 +43,11 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
 
 
 def test_the_summary_says_what_is_not_predicted(files: tuple[Path, ...]) -> None:
-    found = quick()
-    text = " ".join(found.summary().split())
+    reproduction = quick()
+    text = " ".join(reproduction.summary().split())
     page = files[0].read_text(encoding="utf-8")
     others = [
-        one for one in found.obtained
+        one for one in reproduction.obtained
         if one.observable.use == "left out" and not one.observable.circle
     ]  # fmt: skip
     assert len(others) == 5
@@ -137,13 +137,14 @@ def test_a_true_error_that_no_record_tells_is_left_out() -> None:
 
 
 def test_other_models_and_faster_loops_do_better() -> None:
-    found = {one.title: one for one in quick().sections}
-    forward = {row[0]: row[1:] for row in found["Feedforward from other models"].rows}
+    section_of = {one.title: one for one in quick().sections}
+    forward = {row[0]: row[1:] for row in section_of["Feedforward from other models"].rows}
     # Play operators are what the stage is made of.
     assert float(forward["Prandtl-Ishlinskii"][0]) < 0.7 * float(forward["Dahl"][0])
     assert all(float(row[1]) < float(row[0]) for row in forward.values())
     rows = {
-        row[0]: row[1:] for row in found["A filter on the sensor, and loops at 1 and 5 kHz"].rows
+        row[0]: row[1:]
+        for row in section_of["A filter on the sensor, and loops at 1 and 5 kHz"].rows
     }
     for rate in ("1 kHz", "5 kHz"):
         quicker = next(row for name, row in rows.items() if name.startswith(f"{rate}, PI"))
@@ -243,11 +244,11 @@ in_a_browser = pytest.mark.skipif(CHROMIUM is None, reason="no chromium to open 
 @in_a_browser
 @pytest.mark.parametrize("width", [1280, 390])
 def test_a_browser_draws_every_figure(files: tuple[Path, ...], width: int, tmp_path: Path) -> None:
-    page, said = opened(files[0], width, tmp_path)
+    page, message = opened(files[0], width, tmp_path)
     pictures = page.count('<div class="picture')
     assert pictures == 10
     assert f'data-drawn="{pictures} of {pictures}"' in page
-    assert "CONSOLE" not in said
+    assert "CONSOLE" not in message
 
 
 @in_a_browser

@@ -28,7 +28,12 @@ fn main() -> Result<()> {
         ],
         ..Spec::of(Model::Dahl)
     };
-    let plan = Plan { method: Method::Descents(DescentSettings::default()), seed: 1, runs: 1 };
+    let plan = Plan {
+        method: Method::Descents(DescentSettings::default()),
+        seed: 1,
+        runs: 1,
+        start: None,
+    };
     let mut quiet = |_: &Progress| ControlFlow::Continue(());
     let found = identify(&record, &spec, &plan, &mut quiet, NEVER)?;
     for run in &found.runs {

@@ -96,11 +96,11 @@ def test_a_compound_dataset_has_named_columns(tmp_path: Path) -> None:
 
 def test_the_columns_of_another_length_are_named_with_it(tmp_path: Path) -> None:
     path = with_units(tmp_path / "log.h5")
-    found = refusal(path, drive="amplifier")
-    assert "'scan 1/run/voltage' [V] (400 samples)" in found
-    assert "'slow/temperature' [K] (40 samples)" in found
-    found = refusal(path, displacement="temperature", units={"displacement": "um"})
-    assert "'slow/temperature' has 40 samples and column 'scan 1/run/voltage' has 400" in found
+    message = refusal(path, drive="amplifier")
+    assert "'scan 1/run/voltage' [V] (400 samples)" in message
+    assert "'slow/temperature' [K] (40 samples)" in message
+    message = refusal(path, displacement="temperature", units={"displacement": "um"})
+    assert "'slow/temperature' has 40 samples and column 'scan 1/run/voltage' has 400" in message
 
 
 def test_the_extra_is_named_where_h5py_is_not_installed(

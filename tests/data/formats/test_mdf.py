@@ -219,11 +219,11 @@ def test_a_conversion_that_cannot_be_read_is_not_left_out(tmp_path: Path) -> Non
     content = path.read_bytes()
     with asammdf.MDF(path) as file:
         channel = file.groups[0].channels[1]
-        place, own = channel.address + 24 + 4 * 8, channel.conversion_addr
-    assert struct.unpack_from("<Q", content, place) == (own,)
+        place, conversion = channel.address + 24 + 4 * 8, channel.conversion_addr
+    assert struct.unpack_from("<Q", content, place) == (conversion,)
     # Beyond the file; not at a conversion; the default of the table is the table itself.
-    default = own + 24 + 5 * 8
-    for where, value in ((place, len(content) + 8), (place, 64), (default, own)):
+    default = conversion + 24 + 5 * 8
+    for where, value in ((place, len(content) + 8), (place, 64), (default, conversion)):
         changed = bytearray(content)
         struct.pack_into("<Q", changed, where, value)
         path.write_bytes(changed)

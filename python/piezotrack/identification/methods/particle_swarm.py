@@ -41,6 +41,11 @@ class ParticleSwarm:
     and Kennedy 2002, doi 10.1109/4235.985692: it takes more evaluations than the global topology,
     but ends more reliably in the same local minimum, whatever the seed.
 
+    Where `identify` is given no history, the swarm runs once, as of a stage that never moved before
+    the record. Another history is searched by descents from the best candidate of the swarm and a
+    few random places, and is taken where the cost falls by 2 % below the minimum next to that
+    candidate. The result then keeps the runs and the history of costs of the swarm.
+
     Parameters
     ----------
     particles : int, optional

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import DataError
 from ..fitted.start import GAIN
+from ..methods.particle_swarm import ParticleSwarm
 from ..problem.objective import Objective
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["EarlierMotion", "earlier_motion"]
+__all__ = ["EarlierMotion", "earlier_motion", "refined_cost", "starts"]
 
 # Samples of a long record that are simulated: the history shows at its beginning.
 BEGINNING = 200_000
@@ -49,7 +50,31 @@ class EarlierMotion(NamedTuple):
     share: float
 
 
-def earlier_motion(problem: Problem, fit: Identification, threads: int) -> list[EarlierMotion]:
+def refined_cost(problem: Problem, fit: Identification, threads: int) -> float:
+    """Return the cost [m] of the minimum next to a fit: its own but of a swarm without refinement.
+
+    Parameters
+    ----------
+    problem : Problem
+        A model that is searched, and one record.
+    fit : Identification
+        Its fit.
+    threads : int
+        All cores where it is 0.
+
+    Returns
+    -------
+    float
+        The cost.
+    """
+    if not isinstance(fit.method, ParticleSwarm) or fit.method.polish:
+        return fit.cost
+    return min(fit.cost, _lowest(Objective._of(problem, threads), fit))
+
+
+def earlier_motion(
+    problem: Problem, fit: Identification, cost: float, threads: int
+) -> list[EarlierMotion]:
     """Find the histories that lower the cost next to a minimum without one.
 
     Parameters
@@ -58,6 +83,8 @@ def earlier_motion(problem: Problem, fit: Identification, threads: int) -> list[
         A model that is searched, and one record.
     fit : Identification
         Its fit as of a stage that never moved before the record.
+    cost : float
+        Cost of the minimum next to it [m].
     threads : int
         All cores where it is 0.
 
@@ -74,15 +101,12 @@ def earlier_motion(problem: Problem, fit: Identification, threads: int) -> list[
         with_history = replace(record, data=part, history=history)
         return Objective._of(replace(problem, records=(with_history,)), threads)
 
-    def lowest(objective: Objective) -> float:
-        return float(objective.descend(_starts(objective, fit))[1].min())
-
-    part, cost = data, fit.cost
+    part = data
     if len(data) > BEGINNING:
         # Where that shows no reversal, the whole record has to be simulated.
         with suppress(DataError):
             beginning = data[float(data.t[0]) : float(data.t[BEGINNING])]
-            part, cost = beginning, lowest(objective_of(beginning, "virgin"))
+            part, cost = beginning, _lowest(objective_of(beginning, "virgin"), fit)
     fitted = objective_of(part, "fit")
     costs = fitted(_places(fitted, fit))
     # Where the window does not show the voltage before, it shows no history.
@@ -92,13 +116,32 @@ def earlier_motion(problem: Problem, fit: Identification, threads: int) -> list[
         "settled": objective_of(part, "settled"),
         "fit": fitted,
     }
-    settled, before = (EarlierMotion(name, lowest(one) / cost) for name, one in objectives.items())
+    settled, before = (
+        EarlierMotion(name, _lowest(one, fit) / cost) for name, one in objectives.items()
+    )
     gaining = [before] if before.share < (1.0 - GAIN) * settled.share else [settled, before]
     return [one for one in gaining if one.share < 1.0 - GAIN]
 
 
-def _starts(objective: Objective, fit: Identification) -> Array:
-    """Where the descent starts: at the parameters of the fit, after the best voltage of a grid."""
+def _lowest(objective: Objective, fit: Identification) -> float:
+    return float(objective.descend(starts(objective, fit))[1].min())
+
+
+def starts(objective: Objective, fit: Identification) -> Array:
+    """Place the start of a descent at the parameters of a fit, after the best voltage of a grid.
+
+    Parameters
+    ----------
+    objective : Objective
+        The cost with a history.
+    fit : Identification
+        A fit of the same model, as of a stage that never moved before the record.
+
+    Returns
+    -------
+    ndarray, shape (1, d)
+        The place in the unit box.
+    """
     places = _places(objective, fit)
     return places[[int(np.argmin(objective(places)))]]
 

@@ -10,7 +10,8 @@ from ..._support.display.progress_parts import Parts
 from ...errors import Interrupted
 from ..fitted.start import GAIN
 from ..methods.least_squares import LeastSquares
-from .earlier_motion import earlier_motion
+from ..methods.particle_swarm import ParticleSwarm
+from .earlier_motion import earlier_motion, refined_cost
 from .jump import with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
@@ -27,8 +28,9 @@ if TYPE_CHECKING:
 
 __all__ = ["identify_model"]
 
-# Parts of the time of a search, for the progress: without an earlier motion, and with it.
-HISTORIES = (2.0, 1.0)
+# Parts of the time of descents and of a swarm, for the progress: without an earlier motion, and
+# with it.
+HISTORIES, SWARM = (2.0, 1.0), (9.0, 1.0)
 
 
 def identify_model(
@@ -97,21 +99,30 @@ def _weights(
 
 
 def _with_history_shown(problem: Problem, method: Search, run: Run) -> Identification:
-    """Search with the history that a record shows: more freedom has to lower the cost."""
+    """Search with the history that a record shows: more freedom has to lower the cost.
+
+    A swarm runs once, as of a stage that never moved before. From its best candidate and a few
+    random places, descents search with another history; its cost is compared with that of the
+    minimum next to the best candidate of the swarm.
+    """
     (record,) = problem.records
 
-    def search(history: History) -> Identification:
-        with_history = replace(record, history=history)
-        return search_parameters(replace(problem, records=(with_history,)), method, run)
+    def with_history(history: History) -> Problem:
+        return replace(problem, records=(replace(record, history=history),))
 
-    parts = Parts(HISTORIES)
+    swarms = isinstance(method, ParticleSwarm)
+    parts = Parts(SWARM if swarms else HISTORIES)
     with parts.begin(0):
-        fit = virgin = search("virgin")
+        fit = virgin = search_parameters(with_history("virgin"), method, run)
+    alone = least = refined_cost(with_history("virgin"), virgin, run.threads)
     # A part of the record may show a drift where the whole of it does not.
     shown = record if fit.drift else replace(record, drift=False)
-    for other in earlier_motion(replace(problem, records=(shown,)), fit, run.threads):
-        if other.share * virgin.cost < (1.0 - GAIN) * fit.cost:
+    for other in earlier_motion(replace(problem, records=(shown,)), virgin, alone, run.threads):
+        if other.share * alone < (1.0 - GAIN) * least:
             with parts.begin(1):
-                found = search(other.history)
-            fit = found if found.cost < (1.0 - GAIN) * fit.cost else fit
+                found = search_parameters(
+                    with_history(other.history), method, run, virgin if swarms else None
+                )
+            if found.cost < (1.0 - GAIN) * least:
+                fit, least = found, found.cost
     return fit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
@@ -17,12 +18,14 @@ from ..fitted.identification import Identification
 from ..fitted.model_entries import constraint_entries, fit_entry, origin_of, provenance
 from ..fitted.notes import deviation_of
 from ..fitted.start import start_after
+from ..methods.descents import Descents
+from ..problem.objective import Objective
+from .earlier_motion import starts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from ...stages.model_info import ModelInfo
-    from ..methods.descents import Descents
     from ..methods.particle_swarm import ParticleSwarm
     from ..problem.problem import Problem
     from ..problem.records import Record
@@ -32,12 +35,17 @@ __all__ = ["SENSOR", "details_of", "search_parameters"]
 
 # Independent swarms by default: a swarm has to be restarted to tell whether it converged.
 SWARMS = 4
+# Descents after a swarm, for another history: from its best candidate and a few random places.
+DESCENTS = Descents(samples=8, starts=8, rounds=1)
 # Unit and symbol of what is searched beside the parameters of a model.
 SENSOR = {"delay": ("s", "Td"), "voltage_before": ("V", "u0"), "drift_time": ("s", "tau")}
 
 
 def search_parameters(
-    problem: Problem, method: Descents | ParticleSwarm, run: Run
+    problem: Problem,
+    method: Descents | ParticleSwarm,
+    run: Run,
+    swarm: Identification | None = None,
 ) -> Identification:
     """Search the parameters of a model on one record or several, by descents or with a swarm.
 
@@ -49,11 +57,15 @@ def search_parameters(
         What searches.
     run : Run
         How it is run.
+    swarm : Identification, optional
+        What the swarm found on the one record as of a stage that never moved before: descents from
+        there and from random places search the parameters with another history.
 
     Returns
     -------
     Identification
-        Result with the best candidate.
+        Result with the best candidate; runs and course of the search are those of `swarm`, where it
+        is given, and the descents count as its refinement.
 
     Raises
     ------
@@ -62,12 +74,17 @@ def search_parameters(
     """
     problem.check_data()
     info, callback = problem.info, run.callback
+    searcher, runs, start = method, method.runs, None
+    if swarm is not None:
+        searcher, runs = DESCENTS, 1
+        (start,) = starts(Objective._of(problem, run.threads), swarm).tolist()
     with ProgressBar(run.progress, f"identify: {info.name}") as bar:
         found = _core.identify(
             problem,
-            method=method._core,
+            method=searcher._core,
             seed=method.seed,
-            runs=SWARMS if method.runs is None else method.runs,
+            runs=SWARMS if runs is None else runs,
+            start=start,
             threads=run.threads,
             callback=None if callback is None else _reporting(info, callback),
             progress=bar.update,
@@ -76,6 +93,8 @@ def search_parameters(
     if found is None:
         raise Interrupted("interrupted before the first cost was computed")
     fit = _identification(problem, found, method)
+    if swarm is not None:
+        fit = _after_swarm(fit, swarm)
     if not fit.success:
         raise Interrupted(
             f"interrupted after {fit.nfev} simulations, best cost {fit.cost_um:.4g} um", fit
@@ -94,6 +113,38 @@ def _reporting(info: ModelInfo, callback: Callable[[Progress], object]) -> Calla
         return bool(callback(Progress(nit, most, nfev, cost, parameters, delay)))
 
     return report
+
+
+def _after_swarm(fit: Identification, swarm: Identification) -> Identification:
+    """Give the result of descents the course of the swarm that they started from."""
+    ours, course = fit.search, swarm.search
+    if ours is None or course is None:
+        return fit
+    npolish = course.npolish + fit.nfev + ours.npolish
+    nfail = course.nfail + ours.nfail
+    stop_reason = swarm.stop_reason if fit.success else fit.stop_reason
+    entry = {
+        **fit.details["fit"],
+        **{name: swarm.details["fit"][name] for name in ("iterations", "simulations", "runs")},
+        "polish_simulations": npolish,
+        "failed_simulations": nfail,
+        "stop_reason": stop_reason,
+    }
+    return replace(
+        fit,
+        nfev=swarm.nfev,
+        stop_reason=stop_reason,
+        details={**fit.details, "fit": entry},
+        search=replace(
+            ours,
+            runs=course.runs,
+            agreeing_runs=course.agreeing_runs,
+            history=course.history,
+            nit=course.nit,
+            nfail=nfail,
+            npolish=npolish,
+        ),
+    )
 
 
 def _identification(

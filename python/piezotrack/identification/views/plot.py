@@ -213,7 +213,7 @@ def plot_convergence(
     )
     ends = [(run.nit, 1e6 * run.cost) for run in search.runs if 0.0 < run.cost < np.inf]
     if len(ends) > 1:
-        refined = search.npolish and search_name == "swarm"
+        refined = isinstance(fit.method, ParticleSwarm) and fit.method.polish
         label = f"each {search_name}, refined" if refined else f"end of each {search_name}"
         ax.plot(*zip(*ends, strict=True), **{**MARKS, "marker": "x", "label": label})
     if search.npolish and fit.cost > 0.0:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
 from ..._support.units import length_text, of_drive, shown_unit
+from ..fitted.start import GAIN
 from ..methods.descents import Descents
 from ..methods.least_squares import LeastSquares
 from ..methods.particle_swarm import ParticleSwarm
@@ -61,6 +62,13 @@ def summary_text(fit: Identification) -> str:
         iterations = f"{search.nit} iterations, " if isinstance(method, ParticleSwarm) else ""
         how = f"{iterations}{fit.nfev} simulations, seed {method.seed}: {fit.message}"
         lines += [f"      {how}", *_runs(search, method)]
+        least = min((run.cost for run in search.runs), default=0.0)
+        if isinstance(method, ParticleSwarm) and fit.cost < (1.0 - GAIN) * least:
+            history = fit.start.history if fit.start else ""
+            lines.append(
+                f"      as of a stage that never moved; descents from there with "
+                f"history={history!r} end at {fit.cost_um:.4g} um"
+            )
     lines += _trials(fit)
     lines += [*(f"note  {note}" for note in fit.notes), ""]
     return "\n".join([*lines, *(_estimates(fit) if searched else _values(fit))])

@@ -103,7 +103,7 @@ pub fn identify_together(
             let thin = few.iter().zip(&problems).map(|(one, of)| Evaluator::new(one, of, stop));
             let thin = Records::new(thin.collect()).kept(monitor.journal());
             let thin = LocalRefinement { records: &thin, stop };
-            let mut found = descend(&thin, settings, plan.seed, plan.runs, monitor)?;
+            let mut found = descend(&thin, settings, plan, monitor)?;
             if kept.iter().any(|one| one.every > 1) && !stop() {
                 judge(&mut found, &local);
             }

@@ -272,7 +272,7 @@ impl Searcher<'_> {
 
 /// Searches the parameters of a stage; None where the search was stopped before its first cost.
 #[pyfunction]
-#[pyo3(signature = (problem, *, method, seed, runs, threads, callback, progress, checkpoint))]
+#[pyo3(signature = (problem, *, method, seed, runs, start, threads, callback, progress, checkpoint))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn identify(
     py: Python<'_>,
@@ -280,13 +280,14 @@ fn identify(
     method: Searcher<'_>,
     seed: u64,
     runs: usize,
+    start: Option<Vec<f64>>,
     threads: usize,
     callback: Option<Py<PyAny>>,
     progress: Option<Py<PyAny>>,
     checkpoint: Option<PyRef<'_, PyCheckpoint>>,
 ) -> PyResult<Option<PySearch>> {
     let question = problem.question()?;
-    let plan = Plan { method: method.into_method(), seed, runs };
+    let plan = Plan { method: method.into_method(), seed, runs, start };
     let journal = checkpoint.map(|one| one.0.clone() as Arc<dyn Journal>);
     let watchers = Watchers { callback, progress, journal };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {

@@ -5,6 +5,7 @@
 //! Multistart with a reduced sample: Boender, Rinnooy Kan, Timmer and Stougie 1982, doi
 //! 10.1007/BF01581046.
 
+use super::plan::Plan;
 use super::progress::{Monitor, Outcome, Progress, StopReason};
 use crate::error::{Error, Result};
 use crate::identify::cost::residual_sums::Costs;
@@ -155,23 +156,32 @@ struct Search<'a> {
     failures: usize,
 }
 
-/// Searches the box of a problem by descents, `runs` times, each with its own random numbers.
+/// Searches the box of a problem by descents, as often as planned, each time with its own random
+/// numbers.
 ///
 /// The result has the same bits whatever the threads and the instruction set.
 ///
 /// # Errors
-/// [`Error::Numerical`] where no candidate could be simulated.
+/// [`Error::Numerical`] where no candidate could be simulated, [`Error::Parameter`] for a start in a
+/// box of another size.
 pub(in crate::identify) fn descend(
     local: &LocalRefinement<'_>,
     settings: &DescentSettings,
-    seed: u64,
-    runs: usize,
+    plan: &Plan,
     monitor: &mut dyn Monitor,
 ) -> Result<Vec<Outcome>> {
+    let expected = local.records.coordinates().len();
+    if let Some(start) = plan.start.as_ref().filter(|start| start.len() != expected) {
+        return Err(Error::parameter(
+            "coordinates of the start",
+            start.len(),
+            expected.to_string(),
+        ));
+    }
     let mut outcomes = Vec::new();
-    for run in 0..runs as u64 {
+    for run in 0..plan.runs as u64 {
         let mut search = Search::new(local, settings);
-        let reason = search.run(seed, run, monitor);
+        let reason = search.run(plan, run, monitor);
         let simulations = search.evaluations;
         let failures = search.failures;
         let mut found: Vec<Outcome> =
@@ -228,9 +238,9 @@ impl<'a> Search<'a> {
     }
 
     /// Round after round, until descents agree.
-    fn run(&mut self, seed: u64, run: u64, monitor: &mut dyn Monitor) -> StopReason {
+    fn run(&mut self, plan: &Plan, run: u64, monitor: &mut dyn Monitor) -> StopReason {
         for round in 0..self.settings.rounds {
-            let mut descents = self.starts(seed, run, round as u64);
+            let mut descents = self.starts(plan, run, round as u64);
             loop {
                 if (self.local.stop)() || self.report(&descents, monitor) {
                     self.ended.append(&mut descents);
@@ -257,15 +267,18 @@ impl<'a> Search<'a> {
         self.ended.iter().filter(|one| one.costs.rms <= near).count()
     }
 
-    /// Draws the points of a round, and starts from the best that are not beside a better one.
-    fn starts(&mut self, seed: u64, run: u64, round: u64) -> Vec<Descent> {
+    /// Draws the points of a round, with the planned start in the first, and starts from the best
+    /// that are not beside a better one.
+    fn starts(&mut self, plan: &Plan, run: u64, round: u64) -> Vec<Descent> {
         let Self { local, settings, coordinates, .. } = *self;
         let count = settings.samples as u64;
         let point = |i| {
-            let mut draws = Draws::at(seed, run, round, i, count);
+            let mut draws = Draws::at(plan.seed, run, round, i, count);
             (0..coordinates).map(|_| draws.uniform()).collect::<Vec<f64>>()
         };
-        let points: Vec<Vec<f64>> = (0..count).map(point).collect();
+        let given = plan.start.iter().filter(|_| round == 0).cloned();
+        let points: Vec<Vec<f64>> = given.chain((0..count).map(point)).collect();
+        let drawn = points.len();
         let asked: Vec<Point> = points.iter().map(|place| anywhere(place)).collect();
         let costs = local.records.costs(&asked, local.stop);
         self.evaluations += points.len();
@@ -284,7 +297,7 @@ impl<'a> Search<'a> {
         }
         // The simulations of the points are counted with the descents, in even shares.
         let share = chosen.len().max(1);
-        let (each, rest) = (settings.samples / share, settings.samples % share);
+        let (each, rest) = (drawn / share, drawn % share);
         let start = |(i, (place, costs)): (usize, (Vec<f64>, Costs))| {
             Descent::new(place, costs, each + usize::from(i < rest))
         };

@@ -14,6 +14,8 @@ pub struct Plan {
     pub seed: u64,
     /// Searches apart from each other.
     pub runs: usize,
+    /// Place of the unit box from which descents start besides random ones, if any.
+    pub start: Option<Vec<f64>>,
 }
 
 /// Search method.
@@ -44,6 +46,10 @@ impl Plan {
         if self.runs == 0 || self.runs > MOST_RUNS {
             let expected = format!("1 or more, {MOST_RUNS} at most");
             return Err(Error::parameter("runs", self.runs, expected));
+        }
+        let outside = |z: &&f64| !(0.0..=1.0).contains(*z);
+        if let Some(z) = self.start.iter().flatten().find(outside) {
+            return Err(Error::parameter("coordinate of the start", z, "0 to 1"));
         }
         let particles = self.runs * each;
         if particles > MOST_PARTICLES {
