@@ -10,7 +10,7 @@ use piezotrack_core::models::Model;
 use piezotrack_core::parts::Law;
 use piezotrack_core::signal::NEVER;
 use piezotrack_core::simulate::{ReferenceSamples, Timing, VirtualStage};
-use piezotrack_core::tune::{Judged, Task};
+use piezotrack_core::tune::{ErrorSignal, Task};
 
 const SAMPLES: u32 = 1000;
 const LOOPS: u32 = 512;
@@ -58,7 +58,7 @@ fn loops(c: &mut Criterion) {
                 jitter: 0.0,
                 substeps: 1,
             };
-            let judged = Judged::Measured;
+            let error = ErrorSignal::Measured;
             let task = Task {
                 stage,
                 voltages_before: &[],
@@ -67,7 +67,7 @@ fn loops(c: &mut Criterion) {
                 beside: &[],
                 shown_at: 0.0,
                 from: 250,
-                judged,
+                error,
             };
             let task = task.ready().unwrap();
             let all = controllers(dt, repeats);

@@ -8,6 +8,9 @@ from .identification.problem.problem import Problem
 from .identification.solve.weights import Structure
 
 __all__ = [
+    "INTERVALS",
+    "LARGEST",
+    "MOST_SAMPLES",
     "Checkpoint",
     "Controller",
     "Conventional",
@@ -35,6 +38,8 @@ __all__ = [
     "as_number",
     "as_truth",
     "check_loop",
+    "check_margins",
+    "check_part",
     "circle_errors",
     "cross_talk_share",
     "delayed",
@@ -56,19 +61,24 @@ __all__ = [
     "tracking_metrics",
     "tune",
     "turns",
-    "visited",
+    "voltages_before",
 ]
 
 __version__: str
+INTERVALS: tuple[float, float]
+LARGEST: float
+MOST_SAMPLES: int
 
 def as_number(name: str, value: object) -> float: ...
 def as_count(name: str, value: object) -> int: ...
 def as_truth(name: str, value: object) -> bool: ...
+def check_part(role: str, part: tuple[str, list[float]]) -> None: ...
+def check_margins(gain: float, phase: float, sensitivity: float, learning: float) -> None: ...
 def models() -> list[dict[str, Any]]: ...
 def parts() -> list[dict[str, Any]]: ...
 def published(model: str, name: str) -> _Named: ...
 def delayed(x: ArrayLike, v: ArrayLike, dt: float, delay: float) -> NDArray[np.float64]: ...
-def visited(
+def voltages_before(
     u: ArrayLike, dt: float, hold_name: str, history: str, before: float
 ) -> NDArray[np.float64]: ...
 def identify(

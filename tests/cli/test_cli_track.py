@@ -258,7 +258,7 @@ REFUSED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "kp": ((*TRACK, "--kp", "nan"), ("--kp is NaN V/m",)),
     "ti": ((*TRACK, "--ti", "0"), ("--ti is 0 s", "above 0")),
     "tt": ((*TRACK, "--tt", "0.005"), ("tt is 0.005 s", "half a sampling interval")),
-    "kq": ((*TRACK, "--repetitive", "--kq", "2"), ("kq is 2.0 V/um", "below 2")),
+    "kq": ((*TRACK, "--repetitive", "--kq", "2"), ("kq is 2 V/um", "below 2")),
     "dt": ((*TRACK, "--dt", "0"), ("dt is 0",)),
     "coarse": ((*TRACK, "--dt", "1.5", "--tt", "9"), ("dt is 1.5 s", "two samples")),
     "no period": (

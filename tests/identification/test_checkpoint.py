@@ -105,7 +105,7 @@ def test_descents_after_a_swarm_go_on_too(tmp_path: Path) -> None:
     # Within the descents.
     assert len(seen) > swarm.iterations + 5
     assert interrupted(path, swarm.iterations + 4, log, **settings)
-    assert found(pt.identify(log, checkpoint=path, **settings)) == found(fit)
+    assert outcome(pt.identify(log, checkpoint=path, **settings)) == outcome(fit)
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ use piezotrack_core::parts::Law;
 use piezotrack_core::signal::NEVER;
 use piezotrack_core::simulate::{ReferenceSamples, Timing, VirtualStage, track};
 use piezotrack_core::tune::{
-    Aim, Figures, Judge, Judged, Nominal, PlantSet, Requirements, Setting, Sought,
+    Aim, ErrorSignal, Judge, Nominal, PlantSet, Requirements, RunMetrics, Setting, Sought,
     SoughtController, Structure, Task, Template, Tuning, pid,
 };
 
@@ -49,7 +49,7 @@ fn task<'a>(stage: &'a VirtualStage, samples: ReferenceSamples<'a>, delay: f64) 
         beside: &[],
         shown_at: 0.0,
         from: 250,
-        judged: Judged::Measured,
+        error: ErrorSignal::Measured,
     }
 }
 
@@ -76,7 +76,7 @@ fn agrees(stage: &VirtualStage, delay: f64, tolerance: f64) {
     for (i, (controller, figures)) in all.iter().zip(&found).enumerate() {
         let (largest, rms) = alone(&task, controller);
         let near = |a: f64, b: f64| (a - b).abs() < tolerance * b;
-        let Figures { rms: in_lanes, largest: widest, .. } = *figures;
+        let RunMetrics { rms: in_lanes, largest: widest, .. } = *figures;
         assert!(near(in_lanes, rms), "{i}: {in_lanes:e} in lanes, {rms:e} alone");
         assert!(near(widest, largest), "{i}: {widest:e} in lanes, {largest:e} alone");
     }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import _core
 from ..errors import DataError, ParameterError, ShapeError
 from .messages import quoted
 
@@ -30,12 +31,12 @@ __all__ = [
 
 # Largest departure of a time from the even grid, in sampling intervals.
 UNEVEN = 0.05
-# Most samples of a record, as in the core.
-MOST_SAMPLES = 500_000_000
-# Sampling intervals beyond which numbers derived from them leave float64 [s], as in the core.
-SHORTEST, LONGEST = 1e-12, 1e9
-# Size beyond which no sample makes sense, and its square leaves float64 soon; as in the core.
-LARGEST = 1e100
+# Most samples of a record.
+MOST_SAMPLES = _core.MOST_SAMPLES
+# Sampling intervals beyond which numbers derived from them leave float64 [s].
+SHORTEST, LONGEST = _core.INTERVALS
+# Size beyond which no sample makes sense, and its square leaves float64 soon.
+LARGEST = _core.LARGEST
 USE_DT = (
     "an evenly sampled record whose times are coarse or jittery can be given with dt=, "
     "which is used in place of the times"

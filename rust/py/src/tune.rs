@@ -3,8 +3,8 @@
 use piezotrack_core::signal::contour_error::Polyline;
 use piezotrack_core::simulate::{ReferenceSamples, Timing, VirtualStage};
 use piezotrack_core::tune::{
-    Aim, Figures, Found, Judge, Judged, Nominal, Outline, PathTask, PlantSet, Requirements,
-    Robustness, Setting, Settings, Sought, SoughtController, Structure, Task, Template, Tuning,
+    Aim, ErrorSignal, Found, Judge, Nominal, Outline, PathTask, PlantSet, Requirements, Robustness,
+    RunMetrics, Setting, Settings, Sought, SoughtController, Structure, Task, Template, Tuning,
     Worst,
 };
 use piezotrack_core::{Error, Result};
@@ -22,7 +22,15 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyTask>()?;
     module.add_class::<PyPathTask>()?;
     module.add_class::<PySoughtController>()?;
+    module.add_function(wrap_pyfunction!(check_margins, module)?)?;
     module.add_function(wrap_pyfunction!(tune, module)?)
+}
+
+/// Checks margins that a loop is to keep.
+#[pyfunction]
+fn check_margins(gain: f64, phase: f64, sensitivity: f64, learning: f64) -> PyResult<()> {
+    piezotrack_core::tune::check_margins(gain, phase, sensitivity, learning)
+        .map_err(|error| raise(&error))
 }
 
 /// A motion that controllers are judged by.
@@ -36,7 +44,7 @@ pub struct PyTask {
     feedforward: Vec<f64>,
     beside: Vec<f64>,
     from: usize,
-    judged: Judged,
+    error: ErrorSignal,
 }
 
 #[pymethods]
@@ -64,7 +72,7 @@ impl PyTask {
             feedforward: samples("feedforward", feedforward)?,
             beside: samples("beside", beside)?,
             from: first,
-            judged: if measured { Judged::Measured } else { Judged::True },
+            error: if measured { ErrorSignal::Measured } else { ErrorSignal::True },
         })
     }
 
@@ -95,7 +103,7 @@ impl PyTask {
             beside: &self.beside,
             shown_at: 0.0,
             from: self.from,
-            judged: self.judged,
+            error: self.error,
         }
     }
 }
@@ -172,7 +180,7 @@ impl AnyTask<'_> {
 /// Rms error, largest error, effort, slew, clipped share.
 type FigureNumbers = (f64, f64, f64, f64, f64);
 
-fn numbers(of: &Figures) -> FigureNumbers {
+fn numbers(of: &RunMetrics) -> FigureNumbers {
     (of.rms, of.largest, of.effort, of.slew, of.clipped)
 }
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..._support.arguments import in_range, positive
 from .part import Part, part
 
 __all__ = ["Filter", "LowPass", "Notch"]
@@ -28,9 +27,6 @@ class LowPass(Filter):
 
     cutoff: float
 
-    def __post_init__(self) -> None:
-        positive("cutoff", self.cutoff, "Hz")
-
 
 @part("notch")
 @dataclass(frozen=True)
@@ -50,8 +46,3 @@ class Notch(Filter):
     frequency: float
     width: float = 0.5
     depth: float = 0.0
-
-    def __post_init__(self) -> None:
-        positive("frequency", self.frequency, "Hz")
-        positive("width", self.width, "parts of the frequency")
-        in_range("depth", self.depth, 1.0, "parts of 1")

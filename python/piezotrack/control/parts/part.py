@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 import numpy as np
 
 from ... import _core
-from ..._support.arrays import SHORTEST
 from .part_info import LISTED, PartInfo
 
 if TYPE_CHECKING:
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
     from .part_info import Number
 
-__all__ = ["FeedbackLaw", "Part", "part", "part_class"]
+__all__ = ["FeedbackLaw", "Part", "flat", "part", "part_class"]
 
 # The classes of the parts by their names, filled by the decorator.
 REGISTERED: dict[str, type[Part]] = {}
@@ -32,10 +31,13 @@ class Part:
     """Base class of the parts of a controller.
 
     A part is a frozen dataclass with a field for each number that the core lists for it, registered
-    with the decorator `part`.
+    with the decorator `part`. The core checks the numbers.
     """
 
     info: ClassVar[PartInfo]
+
+    def __post_init__(self) -> None:
+        _core.check_part(self.info.role, self._settings)
 
     @property
     def _values(self) -> Mapping[str, Any]:
@@ -51,8 +53,8 @@ class Part:
     def _numbers(self) -> list[float]:
         """All numbers in the order of the core."""
         values = self._values
-        flat = (_flat(one, values[one.name]) for one in self.info.numbers)
-        return [float(one) for one in chain(self._lengths, *flat)]
+        numbers = (flat(of, values[of.name]) for of in self.info.numbers)
+        return [float(number) for number in chain(self._lengths, *numbers)]
 
     @property
     def _settings(self) -> tuple[str, list[float]]:
@@ -62,11 +64,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class FeedbackLaw(Part):
-    """Base class of the feedback laws, whose numbers the core checks."""
-
-    def __post_init__(self) -> None:
-        # At the shortest sampling interval, with which the interval itself forbids least.
-        _core.law_transfer_function(self._settings, SHORTEST)
+    """Base class of the feedback laws."""
 
     @property
     def _pid(self) -> Any:
@@ -123,7 +121,7 @@ def part_class(name: str) -> type[Part]:
     return REGISTERED[name]
 
 
-def _flat(of: Number, value: Any) -> list[Any]:
+def flat(of: Number, value: Any) -> list[Any]:
     """Return the numbers of an entry; NaN, or none of a list, where it is left out."""
     match of.form:
         case "numbers" | "matrix":
@@ -134,6 +132,10 @@ def _flat(of: Number, value: Any) -> list[Any]:
             return [number for one in value for number in one._numbers]
         case "word":
             return [of.choices.index(value)]
+        case "truth":
+            return [_core.as_truth(of.name, value)]
+        case "count":
+            return [_core.as_count(of.name, value)]
     return [math.nan if value is None and of.is_optional else _core.as_number(of.name, value)]
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 
 from ... import _core
-from ..._support.arguments import in_range, positive
 from ...errors import ParameterError
-from .part import Part, part
+from .part import Part, flat, part
 
 __all__ = ["Lag", "Repetitive", "ZeroPhase"]
 
@@ -37,10 +37,6 @@ class Lag(Part):
     tq: float = 0.2
     compensated: bool = False
 
-    def __post_init__(self) -> None:
-        positive("tq", self.tq, "s")
-        _core.as_truth("compensated", self.compensated)
-
 
 @part("zero-phase")
 @dataclass(frozen=True, kw_only=True)
@@ -54,10 +50,6 @@ class ZeroPhase(Part):
     """
 
     order: int = 2
-
-    def __post_init__(self) -> None:
-        if not 1 <= _core.as_count("order", self.order) <= 4:
-            raise ParameterError("order", self.order, "1 to 4")
 
 
 # The filter of the paper, and the default.
@@ -116,22 +108,6 @@ class Repetitive(Part):
     forgetting_factor: float = 0.99
     pause: bool = True
 
-    def __post_init__(self) -> None:
-        positive("period", self.period, "s")
-        if not 0.0 < _core.as_number("kq", self.kq) < 2e6:
-            raise ParameterError(
-                "kq", f"{self.kq:g} V/m", "above 0 and below 2e6 V/m (2 V/um), equation (28)"
-            )
-        if not (self.smoothing is None or isinstance(self.smoothing, (Lag, ZeroPhase))):
-            raise ParameterError(
-                "smoothing", f"{self.smoothing!r}", "pt.control.Lag, pt.control.ZeroPhase or None"
-            )
-        if _core.as_count("lead", self.lead) >= 2**32:
-            raise ParameterError("lead", self.lead, "less than the period allows")
-        if in_range("forgetting_factor", self.forgetting_factor, 1.0, "parts of 1") == 0.0:
-            raise ParameterError("forgetting_factor", "0", "above 0, at most 1")
-        _core.as_truth("pause", self.pause)
-
     @classmethod
     def from_um(
         cls,
@@ -175,9 +151,6 @@ class Repetitive(Part):
         >>> pt.Repetitive.from_um(period=5.0, kq=0.6, smoothing=pt.control.ZeroPhase()).kq
         600000.0
         """
-        gain = _core.as_number("kq", kq)
-        if not 0.0 < gain < 2.0:
-            raise ParameterError("kq", f"{kq} V/um", "above 0 and below 2, equation (28)")
         if tq is not None:
             if smoothing is not LAG:
                 raise ParameterError(
@@ -186,7 +159,7 @@ class Repetitive(Part):
             smoothing = Lag(tq=tq)
         return cls(
             period=period,
-            kq=1e6 * gain,
+            kq=1e6 * _core.as_number("kq", kq),
             smoothing=smoothing,
             lead=lead,
             forgetting_factor=forgetting_factor,
@@ -219,5 +192,10 @@ class Repetitive(Part):
                 kind, number = "zero-phase", float(order)
             case None:
                 kind, number = "none", 0.0
-        last = self.forgetting_factor, self.lead, self.pause
-        return kind, [float(one) for one in (self.period, self.kq, number, *last)]
+            case other:
+                expected = "pt.control.Lag, pt.control.ZeroPhase or None"
+                raise ParameterError("smoothing", f"{other!r}", expected)
+        period, kq, lead, forgetting_factor, pause = chain.from_iterable(
+            flat(of, getattr(self, of.name)) for of in self.info.numbers if of.form != "part"
+        )
+        return kind, [period, kq, number, forgetting_factor, float(lead), float(pause)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -58,16 +57,8 @@ class Margins:
     learning: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("gain", "sensitivity"):
-            value = getattr(self, name)
-            if not 1.0 < _core.as_number(name, value) < math.inf:
-                raise ParameterError(name, value, "a factor above 1")
-        if not 0.0 <= _core.as_number("phase", self.phase) < math.pi:
-            raise ParameterError(
-                "phase", f"{self.phase} rad", "0 to below pi; 30 degrees are 0.524 rad"
-            )
-        if not 0.0 < _core.as_number("learning", self.learning) <= 1.0:
-            raise ParameterError("learning", self.learning, "above 0, at most 1")
+        names = ("gain", "phase", "sensitivity", "learning")
+        _core.check_margins(*(_core.as_number(name, getattr(self, name)) for name in names))
 
 
 @dataclass(frozen=True, kw_only=True)

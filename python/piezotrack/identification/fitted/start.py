@@ -265,8 +265,8 @@ def start_after(
     """
     full = data.full
     before = 0.0 if voltage is None else voltage
-    visited = _core.visited(full.u, data.dt, data.hold, history, before)
-    state = model.equilibrium(visited.tolist())
+    voltages = _core.voltages_before(full.u, data.dt, data.hold, history, before)
+    state = model.equilibrium(voltages.tolist())
     if creeps and history == "settled" and len(getattr(state, "creep", ())):
         state = _repeating(model, data, state)
     return Start(history=history, state=state, voltage=voltage, record=fingerprint(data))

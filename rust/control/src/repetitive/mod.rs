@@ -55,6 +55,23 @@ pub enum Smoothing {
     None,
 }
 
+impl Smoothing {
+    /// Checks its numbers.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    pub fn check(&self) -> Result<()> {
+        match *self {
+            Self::Lag { tq, .. } => positive("tq", tq, "s").map(drop),
+            Self::ZeroPhase { order } => {
+                let right = (1..=4).contains(&order);
+                check("order", f64::from(order), "", right, "1 to 4").map(drop)
+            }
+            Self::None => Ok(()),
+        }
+    }
+}
+
 /// Settings of a repetitive controller, in continuous time.
 ///
 /// | field | symbol | unit | range | default |
@@ -132,20 +149,17 @@ impl Repetitive {
         period.saturating_add(HALF + CUBIC).saturating_mul(2)
     }
 
-    fn check(&self) -> Result<()> {
+    /// Checks the numbers, as far as that can be without a sampling interval.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of its range.
+    pub fn check(&self) -> Result<()> {
         positive("period", self.period, "s")?;
         let right = self.kq > 0.0 && self.kq < 2.0;
         check("kq", self.kq, "V/um", right, "a gain above 0 and below 2, not included")?;
         let right = self.forgetting_factor > 0.0 && self.forgetting_factor <= 1.0;
         check("forgetting_factor", self.forgetting_factor, "", right, "a gain above 0, at most 1")?;
-        match self.smoothing {
-            Smoothing::Lag { tq, .. } => positive("tq", tq, "s").map(drop),
-            Smoothing::ZeroPhase { order } => {
-                let right = (1..=4).contains(&order);
-                check("order", f64::from(order), "", right, "1 to 4").map(drop)
-            }
-            Smoothing::None => Ok(()),
-        }
+        self.smoothing.check()
     }
 
     /// The controller for a sampling interval `dt`, s.

@@ -40,7 +40,7 @@ pub use parameters::relations::Relations;
 pub use parameters::tie::Tie;
 pub use problem::{Problem, Spec};
 pub use records::creep_weights::{CreepWeights, MOST_CREEP, MOST_CREEP_WEIGHTS, creep_times};
-pub use records::history::{History, visited};
+pub use records::history::{History, voltages_before};
 pub use records::record::Record;
 pub use records::resonances::{Resonance, resonances};
 pub use search::descents::DescentSettings;

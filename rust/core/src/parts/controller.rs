@@ -4,11 +4,11 @@
 use piezotrack_control::{Controller, Limits, Span};
 
 use super::filters::{LOW_PASS, NOTCH, filter};
-use super::info::PartInfo;
+use super::info::{PartInfo, Role};
 use super::laws::law::Law;
-use super::repetitive::{LAG, REPETITIVE, ZERO_PHASE, repetitive};
+use super::repetitive::{LAG, REPETITIVE, ZERO_PHASE, check_smoothing, repetitive};
 use crate::error::{Error, Result};
-use crate::signal::sampling_interval;
+use crate::signal::{INTERVALS, sampling_interval};
 
 /// The parts besides the laws of [`Law::INFOS`].
 pub const OTHERS: &[&PartInfo] = &[&REPETITIVE, &LAG, &ZERO_PHASE, &LOW_PASS, &NOTCH];
@@ -33,6 +33,21 @@ pub struct ControllerParts<'a> {
     pub repetitive: Option<Named<'a>>,
     /// Filters of the measurement.
     pub filters: Vec<Named<'a>>,
+}
+
+/// Checks the numbers of a part before a sampling interval is known: at the shortest, with which the
+/// interval itself forbids least.
+///
+/// # Errors
+/// [`Error::Parameter`] for a name that is unknown, another count of numbers, and a number out of its
+/// range.
+pub fn check_part(role: Role, (name, numbers): Named<'_>) -> Result<()> {
+    match role {
+        Role::Law => Law::named(name, numbers, INTERVALS.0).map(drop),
+        Role::Repetitive => repetitive(name, numbers).map(drop),
+        Role::Smoothing => check_smoothing(name, numbers),
+        Role::Filter => filter(name, numbers, INTERVALS.0).map(drop),
+    }
 }
 
 impl ControllerParts<'_> {

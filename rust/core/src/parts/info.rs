@@ -191,7 +191,8 @@ pub(super) fn whole(name: &str, number: f64, least: f64) -> Result<usize> {
     if (least..=f64::from(u32::MAX)).contains(&number) && number.fract().abs() <= 0.0 {
         return Ok(number as usize);
     }
-    Err(Error::parameter(name, format!("{number:?}"), format!("a whole number from {least} on")))
+    let expected = format!("a whole number from {least} on, below 2^32");
+    Err(Error::parameter(name, format!("{number:?}"), expected))
 }
 
 /// A truth value that came as a float.

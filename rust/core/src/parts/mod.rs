@@ -7,7 +7,7 @@ mod info;
 mod laws;
 mod repetitive;
 
-pub use controller::{ControllerParts, Named, OTHERS};
+pub use controller::{ControllerParts, Named, OTHERS, check_part};
 pub use info::{Form, NumberInfo, PartInfo, Role};
 pub use laws::law::{Law, LawState};
 pub use laws::state_space::MOST_STATES;

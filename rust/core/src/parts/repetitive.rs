@@ -41,21 +41,36 @@ pub(super) fn repetitive(smoothing: &str, numbers: &[f64]) -> Result<Repetitive>
         let value = format!("'{smoothing}' with {} numbers", numbers.len());
         return Err(Error::parameter("repetitive", value, "six numbers"));
     };
-    let whole = |name, number| -> Result<u32> {
-        Ok(u32::try_from(whole(name, number, 0.0)?).unwrap_or(u32::MAX))
-    };
     let smoothing = match smoothing {
         "lag" => Smoothing::Lag { tq: number, compensated: false },
         "compensated-lag" => Smoothing::Lag { tq: number, compensated: true },
-        "zero-phase" => Smoothing::ZeroPhase { order: whole("order", number)? },
+        "zero-phase" => Smoothing::ZeroPhase { order: count("order", number)? },
         "none" => Smoothing::None,
         other => {
             let expected = "'lag', 'compensated-lag', 'zero-phase' or 'none'";
             return Err(Error::parameter("smoothing", format!("'{other}'"), expected));
         }
     };
-    let (lead, pause) = (whole("lead", lead)?, truth("pause", pause)?);
+    let (lead, pause) = (count("lead", lead)?, truth("pause", pause)?);
     // The bound of the gain holds for errors in um.
-    let learner = Repetitive::new(period, smoothing, kq / 1e6)?;
-    Ok(Repetitive { forgetting_factor, lead, pause, ..learner })
+    let part = Repetitive { period, smoothing, kq: kq / 1e6, forgetting_factor, lead, pause };
+    part.check()?;
+    Ok(part)
+}
+
+/// Checks the filter of a repetitive part alone.
+pub(super) fn check_smoothing(name: &str, numbers: &[f64]) -> Result<()> {
+    let smoothing = match (name, numbers) {
+        ("lag", &[tq, compensated]) => {
+            Smoothing::Lag { tq, compensated: truth("compensated", compensated)? }
+        }
+        ("zero-phase", &[order]) => Smoothing::ZeroPhase { order: count("order", order)? },
+        ("zero-phase", _) => return Err(ZERO_PHASE.refused(numbers)),
+        _ => return Err(LAG.refused(numbers)),
+    };
+    Ok(smoothing.check()?)
+}
+
+fn count(name: &str, number: f64) -> Result<u32> {
+    Ok(u32::try_from(whole(name, number, 0.0)?).unwrap_or(u32::MAX))
 }

@@ -29,8 +29,7 @@ pub struct Drive<'a> {
 }
 
 /// Sampling intervals beyond which numbers derived from them leave `f64`, s.
-const SHORTEST: f64 = 1e-12;
-const LONGEST: f64 = 1e9;
+pub const INTERVALS: (f64, f64) = (1e-12, 1e9);
 
 impl<'a> Drive<'a> {
     /// Checks the interval and the samples.
@@ -61,10 +60,11 @@ impl<'a> Drive<'a> {
 /// Refuses a sampling interval (s) that is not from 1 ps to 1e9 s.
 pub(crate) fn sampling_interval(dt: f64) -> Result<f64> {
     positive("dt", dt, "s")?;
-    if (SHORTEST..=LONGEST).contains(&dt) {
+    let (shortest, longest) = INTERVALS;
+    if (shortest..=longest).contains(&dt) {
         return Ok(dt);
     }
-    let expected = format!("{SHORTEST:e} to {LONGEST:e} s");
+    let expected = format!("{shortest:e} to {longest:e} s");
     Err(Error::parameter("dt", format!("{dt:e} s"), expected))
 }
 

@@ -9,7 +9,7 @@ pub mod metrics;
 mod turning_points;
 
 pub use delay::delayed;
-pub use drive::{Drive, Hold, NEVER, Stop};
+pub use drive::{Drive, Hold, INTERVALS, NEVER, Stop};
 pub use turning_points::turns;
 
 pub(crate) use delay::FractionalDelay;

@@ -6,8 +6,8 @@
 use piezotrack_control::Controller;
 use rayon::prelude::*;
 
-use super::figures::Figures;
 use super::loops::{Motion, ReadyTask, Task};
+use super::run_metrics::RunMetrics;
 use crate::error::{Error, Result, not_negative};
 use crate::math::room;
 use crate::parts::Law;
@@ -85,15 +85,15 @@ impl<'a> PathTask<'a> {
         Ok(out)
     }
 
-    fn figures(&self, x: &Motion, y: &Motion) -> Result<Figures> {
+    fn figures(&self, x: &Motion, y: &Motion) -> Result<RunMetrics> {
         let Motion { figures: of_x, shown: along_x } = x;
         let Motion { figures: of_y, shown: along_y } = y;
-        if *of_x == Figures::FAILED || *of_y == Figures::FAILED {
-            return Ok(Figures::FAILED);
+        if *of_x == RunMetrics::FAILED || *of_y == RunMetrics::FAILED {
+            return Ok(RunMetrics::FAILED);
         }
         let errors = self.errors(along_x, along_y)?;
         let squares: f64 = errors.iter().map(|error| error * error).sum();
-        Ok(Figures {
+        Ok(RunMetrics {
             rms: libm::sqrt(squares / index(errors.len())),
             largest: errors.iter().fold(0.0, |most, error| error.abs().max(most)),
             effort: libm::sqrt(0.5 * (of_x.effort * of_x.effort + of_y.effort * of_y.effort)),
@@ -111,7 +111,7 @@ pub struct ReadyPath<'a> {
 }
 
 impl ReadyPath<'_> {
-    /// Figures of each pair of controllers: errors are contour errors, effort is the rms of both
+    /// Metrics of each pair of controllers: errors are contour errors, effort is the rms of both
     /// axes, slew and clipped share the larger one.
     ///
     /// # Errors
@@ -120,7 +120,7 @@ impl ReadyPath<'_> {
         &self,
         controllers: [&[Controller<Law>]; 2],
         stop: Stop<'_>,
-    ) -> Result<Vec<Figures>> {
+    ) -> Result<Vec<RunMetrics>> {
         let [x, y] = &self.axes;
         let x = x.motions(controllers[0], true, stop)?;
         let y = y.motions(controllers[1], true, stop)?;

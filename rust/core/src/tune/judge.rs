@@ -3,8 +3,8 @@
 use piezotrack_control::Controller;
 
 use super::contour::{PathTask, ReadyPath};
-use super::figures::Figures;
 use super::loops::{ReadyTask, Task};
+use super::run_metrics::RunMetrics;
 use crate::error::{Error, Result};
 use crate::parts::Law;
 use crate::signal::Stop;
@@ -43,12 +43,12 @@ pub(super) enum Ready<'a> {
 }
 
 impl Ready<'_> {
-    /// Figures of each controller, or of each pair of them.
+    /// Metrics of each controller, or of each pair of them.
     pub(super) fn figures(
         &self,
         controllers: &[Vec<Controller<Law>>],
         stop: Stop<'_>,
-    ) -> Result<Vec<Figures>> {
+    ) -> Result<Vec<RunMetrics>> {
         match (self, controllers) {
             (Self::Axis(task), [all]) => task.figures(all, stop),
             (Self::Path(task), [x, y]) => task.figures([x, y], stop),

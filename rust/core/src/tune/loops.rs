@@ -8,8 +8,8 @@ use piezotrack_control::{Controller, ControllerState, Number};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::figures::{Figures, Score};
 use super::parts::{Part, coarse_step, parts};
+use super::run_metrics::{RunMetrics, Score};
 use crate::error::{Error, Result};
 use crate::math::{Lanes, dispatch_vectors, on_all_threads, room, width, zeros};
 use crate::models::{LanedPlant, LanedVisitor, StageState};
@@ -21,7 +21,7 @@ use crate::simulate::{
 
 /// Which error counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judged {
+pub enum ErrorSignal {
     /// Reference less reading: what a person sees on hardware.
     Measured,
     /// Reference less true displacement, without noise and quantisation of the sensor.
@@ -47,7 +47,7 @@ pub struct Task<'a> {
     /// Samples before the first that counts.
     pub from: usize,
     /// Which error counts.
-    pub judged: Judged,
+    pub error: ErrorSignal,
 }
 
 /// Instants of a control interval at which a loop by itself is shown.
@@ -125,9 +125,9 @@ impl<'a> Task<'a> {
             let own = run.displacement[at] + self.beside(k);
             // Of the last sample there is nothing later.
             let then = run.displacement.get(at + later).map_or(own, |then| then + self.beside(k));
-            let noise = match self.judged {
-                Judged::Measured => run.measured[at] - run.displacement[at],
-                Judged::True => 0.0,
+            let noise = match self.error {
+                ErrorSignal::Measured => run.measured[at] - run.displacement[at],
+                ErrorSignal::True => 0.0,
             };
             score.take(
                 k >= self.from,
@@ -144,7 +144,7 @@ impl<'a> Task<'a> {
 /// A loop that was simulated.
 #[derive(Clone, Debug)]
 pub(super) struct Motion {
-    pub(super) figures: Figures,
+    pub(super) figures: RunMetrics,
     /// Reading or true displacement, as is judged, in each control interval, m; empty where it
     /// failed, or was not asked for.
     pub(super) shown: Vec<f64>,
@@ -152,7 +152,7 @@ pub(super) struct Motion {
 
 impl Motion {
     fn failed() -> Self {
-        Self { figures: Figures::FAILED, shown: Vec::new() }
+        Self { figures: RunMetrics::FAILED, shown: Vec::new() }
     }
 }
 
@@ -166,15 +166,19 @@ pub struct ReadyTask<'a> {
 }
 
 impl ReadyTask<'_> {
-    /// Figures of each controller in its loop, in their order, computed on the threads of the present
+    /// Metrics of each controller in its loop, in their order, computed on the threads of the present
     /// pool; the bits are the same for any number of them. Where `stop` said so,
-    /// [`Figures::FAILED`].
+    /// [`RunMetrics::FAILED`].
     ///
     /// With sampling jitter, and for a stage without lanes, each loop is simulated by itself.
     ///
     /// # Errors
     /// Those of [`crate::simulate::track`], and where memory does not suffice.
-    pub fn figures(&self, controllers: &[Controller<Law>], stop: Stop<'_>) -> Result<Vec<Figures>> {
+    pub fn figures(
+        &self,
+        controllers: &[Controller<Law>],
+        stop: Stop<'_>,
+    ) -> Result<Vec<RunMetrics>> {
         let motions = self.motions(controllers, false, stop)?;
         Ok(motions.into_iter().map(|motion| motion.figures).collect())
     }
@@ -305,9 +309,9 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
             .iter()
             .map(|part| (plant.flow(zero, part.step), stage.amplifier.flow(part.step), part))
             .collect();
-        let judged = |reading: f64, x: f64| match task.judged {
-            Judged::Measured => reading,
-            Judged::True => x - start.sensor.zero,
+        let judged = |reading: f64, x: f64| match task.error {
+            ErrorSignal::Measured => reading,
+            ErrorSignal::True => x - start.sensor.zero,
         };
         let mut state = plant.start(zero);
         let mut applied = zero.like(start.applied);

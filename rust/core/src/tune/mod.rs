@@ -2,18 +2,18 @@
 //! keep for every model of a set, and the search.
 
 mod contour;
-mod figures;
 mod judge;
 mod loops;
 mod parts;
 mod requirements;
+mod run_metrics;
 mod search;
 mod settings;
 
 pub use contour::{Outline, PathTask, ReadyPath};
-pub use figures::Figures;
 pub use judge::Judge;
-pub use loops::{Judged, ReadyTask, Task};
-pub use requirements::{PlantSet, Requirements, Robustness, Worst};
+pub use loops::{ErrorSignal, ReadyTask, Task};
+pub use requirements::{PlantSet, Requirements, Robustness, Worst, check_margins};
+pub use run_metrics::RunMetrics;
 pub use search::{Aim, Found, Settings, SoughtController, Tuning};
 pub use settings::{Nominal, Setting, Sought, Structure, Template, pid};

@@ -38,18 +38,9 @@ impl Requirements {
     /// # Errors
     /// [`Error::Parameter`] naming the one that no loop can keep.
     pub fn validate(&self) -> Result<()> {
-        let above = |name: &str, value: f64| {
-            if value > 1.0 && value.is_finite() {
-                return Ok(());
-            }
-            Err(Error::parameter(name, value, "a finite number above 1"))
-        };
-        above("gain_margin", self.gain_margin)?;
-        above("sensitivity", self.sensitivity)?;
-        if !(self.phase_margin >= 0.0 && self.phase_margin < PI) {
-            let found = format!("{} rad", self.phase_margin);
-            return Err(Error::parameter("phase_margin", found, "from 0 to below pi rad"));
-        }
+        // The search of a loop that forgets nothing bounds what is learnt by 1 and a rounding.
+        let learning = positive("learning", self.learning, "")?.min(1.0);
+        check_margins(self.gain_margin, self.phase_margin, self.sensitivity, learning)?;
         if self.slew.is_nan() || self.slew <= 0.0 {
             let found = format!("{} V/s", self.slew);
             return Err(Error::parameter("slew", found, "above 0, or infinity"));
@@ -62,8 +53,28 @@ impl Requirements {
             let expected = "a share, 0 to 1";
             return Err(Error::parameter("largest_saturation", self.largest_saturation, expected));
         }
-        positive("learning", self.learning, "").map(drop)
+        Ok(())
     }
+}
+
+/// Checks margins as those of [`Requirements`], `phase` in rad.
+///
+/// # Errors
+/// [`Error::Parameter`] naming the one that no loop can keep.
+pub fn check_margins(gain: f64, phase: f64, sensitivity: f64, learning: f64) -> Result<()> {
+    for (name, value) in [("gain", gain), ("sensitivity", sensitivity)] {
+        if !(value > 1.0 && value.is_finite()) {
+            return Err(Error::parameter(name, value, "a factor above 1"));
+        }
+    }
+    if !(0.0..PI).contains(&phase) {
+        let expected = "0 to below pi; 30 degrees are 0.524 rad";
+        return Err(Error::parameter("phase", format!("{phase} rad"), expected));
+    }
+    if !(learning > 0.0 && learning <= 1.0) {
+        return Err(Error::parameter("learning", learning, "above 0, at most 1"));
+    }
+    Ok(())
 }
 
 /// A number of the worst plant of a set.

@@ -8,9 +8,9 @@
 use piezotrack_control::Controller;
 use rayon::prelude::*;
 
-use super::figures::Figures;
 use super::judge::{Judge, Ready};
 use super::requirements::{PlantSet, Requirements, Robustness};
+use super::run_metrics::RunMetrics;
 use super::settings::{Setting, Sought, Template};
 use crate::error::{Error, Result, not_negative};
 use crate::identify::{Swarm, SwarmSettings};
@@ -77,7 +77,7 @@ pub struct Found {
     /// Margins that they keep over the plants, which are numbered through all axes.
     pub robustness: Robustness,
     /// Their figures in each task; empty where they do not keep the margins.
-    pub figures: Vec<Figures>,
+    pub figures: Vec<RunMetrics>,
     /// How far they are from what is required: 1 or less where they keep it.
     pub excess: f64,
     /// Their figure, m, or V of [`Aim::Effort`]; of [`Aim::Disturbance`] 1 over the integral gain,
@@ -97,7 +97,7 @@ struct Tried {
     settings: Vec<Settings>,
     controllers: Option<Vec<Controller<Law>>>,
     robustness: Option<Robustness>,
-    figures: Vec<Figures>,
+    figures: Vec<RunMetrics>,
     excess: f64,
     cost: f64,
 }
@@ -272,12 +272,12 @@ impl Tuning<'_> {
     }
 
     /// Figure over all tasks, and how far from what is required.
-    fn figure(&self, all: &[Figures], excess: f64) -> (f64, f64) {
+    fn figure(&self, all: &[RunMetrics], excess: f64) -> (f64, f64) {
         let count = index(all.len()).max(1.0);
-        let mean = |of: fn(&Figures) -> f64| {
+        let mean = |of: fn(&RunMetrics) -> f64| {
             libm::sqrt(all.iter().map(|one| of(one) * of(one)).sum::<f64>() / count)
         };
-        let most = |of: fn(&Figures) -> f64| all.iter().map(of).fold(0.0, f64::max);
+        let most = |of: fn(&RunMetrics) -> f64| all.iter().map(of).fold(0.0, f64::max);
         let error = match self.aim {
             Aim::Rms | Aim::Disturbance => mean(|one| one.rms),
             Aim::Largest => most(|one| one.largest),

@@ -4,7 +4,7 @@ use piezotrack_control::{Command, Controller, ControllerState};
 use piezotrack_core::Error;
 use piezotrack_core::design::LinearFeedback;
 use piezotrack_core::math::zeros;
-use piezotrack_core::parts::{ControllerParts, Law, LawState, Named};
+use piezotrack_core::parts::{ControllerParts, Law, LawState, Named, Role};
 use piezotrack_core::simulate::DELAY_LINE;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -16,6 +16,7 @@ use crate::errors::raise;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyController>()?;
+    module.add_function(wrap_pyfunction!(check_part, module)?)?;
     module.add_function(wrap_pyfunction!(law_transfer_function, module)?)?;
     module.add_class::<PySession>()
 }
@@ -100,6 +101,19 @@ impl PyController {
 
 fn borrowed((name, numbers): &NamedPart) -> Named<'_> {
     (name, numbers)
+}
+
+/// Checks the numbers of a part by its role.
+#[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "as Python gives them")]
+fn check_part(role: &str, part: NamedPart) -> PyResult<()> {
+    let role = match role {
+        "law" => Role::Law,
+        "filter" => Role::Filter,
+        "repetitive" => Role::Repetitive,
+        _ => Role::Smoothing,
+    };
+    piezotrack_core::parts::check_part(role, borrowed(&part)).map_err(|error| raise(&error))
 }
 
 /// Numerator and denominator of a law in powers of `z - 1`, constant term first.

@@ -12,10 +12,10 @@ use crate::conversions::numbers::is_unsuitable;
 use crate::errors::{data, raise, shape};
 
 /// Most samples of an array: 4 GB, of which a simulation needs several times as much.
-const MOST_SAMPLES: usize = 500_000_000;
+pub const MOST_SAMPLES: usize = 500_000_000;
 
-/// Size beyond which no sample makes sense, and its square leaves float64 soon; as in Python.
-const LARGEST: f64 = 1e100;
+/// Size beyond which no sample makes sense, and its square leaves float64 soon.
+pub const LARGEST: f64 = 1e100;
 
 const EXPECTED: &str = "a one-dimensional array of numbers";
 

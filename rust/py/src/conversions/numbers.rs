@@ -5,9 +5,13 @@ use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyComplex, PyFloat, PyInt, PyString};
 
+use crate::conversions::arrays::{LARGEST, MOST_SAMPLES};
 use crate::errors::raise;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("INTERVALS", piezotrack_core::signal::INTERVALS)?;
+    module.add("LARGEST", LARGEST)?;
+    module.add("MOST_SAMPLES", MOST_SAMPLES)?;
     module.add_function(wrap_pyfunction!(as_number, module)?)?;
     module.add_function(wrap_pyfunction!(as_count, module)?)?;
     module.add_function(wrap_pyfunction!(as_truth, module)?)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use numpy::PyArray1;
 use piezotrack_core::identify::{
     BEFORE, Coordinate, DELAY, DRIFT_TIME, History, Identification, Journal, Method, Outcome,
-    OwnResult, Plan, Record, Relations, Spec, StopReason, identify_together, visited,
+    OwnResult, Plan, Record, Relations, Spec, StopReason, identify_together,
 };
 use piezotrack_core::integrator::Order;
 use piezotrack_core::signal::Drive;
@@ -237,7 +237,6 @@ impl PySearch {
 
 /// The voltages that a stage visits slowly before the drive of a record.
 #[pyfunction]
-#[pyo3(name = "visited")]
 fn voltages_before<'py>(
     py: Python<'py>,
     u: &Bound<'py, PyAny>,
@@ -249,7 +248,7 @@ fn voltages_before<'py>(
     let u = samples("u", u)?;
     let voltages = || {
         let drive = Drive::new(&u, dt, hold(hold_name)?)?;
-        Ok(visited(&drive, History::named(history)?, before))
+        Ok(piezotrack_core::identify::voltages_before(&drive, History::named(history)?, before))
     };
     array(py, voltages().map_err(|error| raise(&error))?.into_iter())
 }

@@ -19,7 +19,7 @@ use super::step_size;
 use crate::identify::parameters::candidate::{BEFORE, Candidate, Theta};
 use crate::identify::problem::Problem;
 use crate::identify::records::creep_weights::CreepWeights;
-use crate::identify::records::history::visited;
+use crate::identify::records::history::voltages_before;
 use crate::identify::records::record::Record;
 use crate::integrator::{
     FeedbackState, Kernel, MOST_PARAMETERS, Mechanics, Stepping, SteppingLoop, halvings,
@@ -63,7 +63,7 @@ impl<'a> Evaluator<'a> {
         let creep_times = &problem.creep_times;
         let (offset, drifts) = (problem.offset, problem.has_drift());
         let residuals = Residuals { record, offset, centre, creep_times, drifts };
-        let visited = visited(&record.drive, problem.history, f64::NAN);
+        let visited = voltages_before(&record.drive, problem.history, f64::NAN);
         Self { residuals, problem, held, arch, stepping, halvings, visited }
     }
 

@@ -1,7 +1,7 @@
 //! Motion of one candidate, stepped as the search steps.
 
 use crate::identify::parameters::candidate::Theta;
-use crate::identify::records::history::{History, visited};
+use crate::identify::records::history::{History, voltages_before};
 use crate::integrator::{Kernel, LumpedStage, Parameters, Stepping};
 use crate::models::{Held, KernelVisitor, Model};
 use crate::signal::{Drive, Stop};
@@ -17,7 +17,7 @@ pub(in crate::identify) fn motion(
 ) -> Option<[Vec<f64>; 2]> {
     let parameters = theta.parameters();
     let held = Held::all(model.scalars(), &parameters);
-    let voltages = visited(drive, history, theta.before());
+    let voltages = voltages_before(drive, history, theta.before());
     let one = One { parameters, voltages, drive, substeps: stepping.substeps, stop };
     model.kernel(&held, stepping.order, one).flatten()
 }

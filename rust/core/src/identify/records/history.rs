@@ -53,7 +53,7 @@ const ROUNDS: usize = 2;
 /// The voltages that a stage visits slowly, in turn, before the drive of a record, the last of
 /// which is its first sample; `from` is the voltage of a history that is fitted.
 #[must_use]
-pub fn visited(drive: &Drive<'_>, history: History, from: f64) -> Vec<f64> {
+pub fn voltages_before(drive: &Drive<'_>, history: History, from: f64) -> Vec<f64> {
     let first = drive.u.first().copied().unwrap_or(0.0);
     match history {
         History::Virgin => vec![first],

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::fit::Fit;
 use super::follower::Follower;
 use crate::error::Result;
-use crate::identify::records::history::{History, visited};
+use crate::identify::records::history::{History, voltages_before};
 use crate::models::{Dynamics, Experiment, Relaxation, Rest, Values};
 use crate::signal::{FractionalDelay, index};
 
@@ -69,7 +69,7 @@ impl<'a> Fit<'a> {
         let mut path =
             Path { memory: self.signals.rest(), signals: vec![0.0; self.signals.count()] };
         let begin = self.begins[r];
-        for volts in visited(&self.common.records[r].drive, begin.history, begin.from) {
+        for volts in voltages_before(&self.common.records[r].drive, begin.history, begin.from) {
             self.push(&mut path, volts, f64::INFINITY);
         }
         path

@@ -1,8 +1,8 @@
-//! Figures that are read of a closed loop while it runs.
+//! Metrics that are read of a closed loop while it runs.
 
-/// Figures of a closed loop.
+/// Metrics of the run of a closed loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Figures {
+pub struct RunMetrics {
     /// Tracking error, m rms.
     pub rms: f64,
     /// Largest tracking error, m.
@@ -15,7 +15,7 @@ pub struct Figures {
     pub clipped: f64,
 }
 
-impl Figures {
+impl RunMetrics {
     /// Of a loop that did not stay finite.
     pub const FAILED: Self = Self {
         rms: f64::INFINITY,
@@ -71,11 +71,11 @@ impl Score {
         }
     }
 
-    pub(super) fn figures(&self) -> Figures {
+    pub(super) fn figures(&self) -> RunMetrics {
         if !(self.largest <= DIVERGED && self.squares.is_finite() && self.count > 0.0) {
-            return Figures::FAILED;
+            return RunMetrics::FAILED;
         }
-        Figures {
+        RunMetrics {
             rms: libm::sqrt(self.squares / self.count),
             largest: self.largest,
             effort: libm::sqrt(self.changes / self.count),
