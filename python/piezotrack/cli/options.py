@@ -16,11 +16,9 @@ from .terminal import one_line
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from ..data.dataset import Dataset, Hold
-    from ..data.missing import Missing
+    from ..data.dataset import Dataset
 
 __all__ = [
-    "Columns",
     "ControlInterval",
     "Decimate",
     "DisplacementColumn",
@@ -141,56 +139,6 @@ OutFile = Annotated[
     Path, typer.Argument(metavar="OUT", help="File to write: .csv, .npz, .mat or .parquet.")
 ]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file in JSON.")]
-
-
-class Columns:
-    """Columns of a log by the options that name them; a number counts from 0."""
-
-    def __init__(
-        self,
-        time: str | None,
-        drive: str | None,
-        displacement: str | None,
-        unit: list[str] | None,
-        dt: float | None,
-        decimate: int | None = None,
-        zero: bool = False,
-    ) -> None:
-        self.time, self.drive, self.displacement = map(column, (time, drive, displacement))
-        self.units = {column(name) or name: text for name, text in pairs("--unit", unit)}
-        self.dt, self.decimate, self.zero = dt, decimate, zero
-
-    def read(
-        self,
-        file: Path,
-        hold: Hold,
-        resample: float | None = None,
-        missing: Missing = None,
-    ) -> Dataset:
-        """Read a log with these columns."""
-        from ..data.reader import read
-
-        log = read(
-            file,
-            time=self.time,
-            drive=self.drive,
-            displacement=self.displacement,
-            units=self.units,
-            dt=self.dt,
-            resample=resample,
-            hold=hold,
-            missing=missing,
-        )
-        if self.decimate not in (None, 1):
-            with of_file(file):
-                log = log.decimate(self.decimate)
-        return log.zeroed() if self.zero else log
-
-    def read_drive(self, file: Path) -> Dataset:
-        """Read a drive with these columns."""
-        from ..data.reader import drive_dataset
-
-        return drive_dataset(file, time=self.time, drive=self.drive, units=self.units, dt=self.dt)
 
 
 def column(text: str | None) -> str | int | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..error_messages import report_errors
-from ..options import Json, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
+from ..options import Json, Out, Overwrite, Quiet
 from ..output import Output
 
 if TYPE_CHECKING:

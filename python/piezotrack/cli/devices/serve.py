@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from contextlib import contextmanager
-from pathlib import Path  # noqa: TC003, which typer reads
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer

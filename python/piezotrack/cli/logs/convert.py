@@ -4,41 +4,20 @@ from __future__ import annotations
 
 from ...errors import ParameterError
 from ..error_messages import report_errors
-from ..options import (
-    Columns,
-    Decimate,
-    DisplacementColumn,
-    DriveColumn,
-    Interval,
-    LogFile,
-    MissingOption,
-    OutFile,
-    Overwrite,
-    Quiet,
-    Resample,
-    TimeColumn,
-    Units,
-    Zero,
-    list_files,
-)
+from ..option_groups import LogOptions, with_groups
+from ..options import LogFile, OutFile, Overwrite, Quiet, list_files
 
 __all__ = ["convert_command"]
 
 
 @report_errors
+@with_groups
 def convert_command(
     file: LogFile,
     out: OutFile,
     overwrite: Overwrite = False,
-    time: TimeColumn = None,
-    drive: DriveColumn = None,
-    displacement: DisplacementColumn = None,
-    unit: Units = None,
-    dt: Interval = None,
-    resample: Resample = None,
-    decimate: Decimate = None,
-    zero: Zero = False,
-    missing: MissingOption = None,
+    *,
+    reading: LogOptions,
     quiet: Quiet = False,
 ) -> None:
     """Write a log of any format as CSV, NPZ, MAT or Parquet.
@@ -52,9 +31,7 @@ def convert_command(
     format_to_write(out)
     if out.exists() and not overwrite:
         raise ParameterError(f"{out} exists: expected --overwrite, or another name")
-    log = Columns(time, drive, displacement, unit, dt, decimate, zero).read(
-        file, "foh", resample, missing
-    )
+    log = reading.log(file)
     written = log.save(out)
     if not quiet:
         print(f"{len(log)} samples, {log.duration:.6g} s at {1.0 / log.dt:.6g} Hz")

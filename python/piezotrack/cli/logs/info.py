@@ -5,29 +5,18 @@ from __future__ import annotations
 import json as json_text
 
 from ..error_messages import report_errors
-from ..options import (
-    Columns,
-    DisplacementColumn,
-    DriveColumn,
-    Interval,
-    Json,
-    LogFile,
-    MissingOption,
-    TimeColumn,
-    Units,
-)
+from ..option_groups import Columns, with_groups
+from ..options import Json, LogFile, MissingOption
 
 __all__ = ["info_command"]
 
 
 @report_errors
+@with_groups
 def info_command(
     file: LogFile,
-    time: TimeColumn = None,
-    drive: DriveColumn = None,
-    displacement: DisplacementColumn = None,
-    unit: Units = None,
-    dt: Interval = None,
+    *,
+    columns: Columns,
     missing: MissingOption = None,
     json: Json = False,
 ) -> None:
@@ -40,16 +29,7 @@ def info_command(
     from ...data.checks.log_info import info
     from ..output import print_words
 
-    columns = Columns(time, drive, displacement, unit, dt)
-    report = info(
-        file,
-        time=columns.time,
-        drive=columns.drive,
-        displacement=columns.displacement,
-        units=columns.units,
-        dt=columns.dt,
-        missing=missing,
-    )
+    report = info(file, **columns.arguments, missing=missing)
     if json:
         print(json_text.dumps(json_ready(report.document()), indent=2, allow_nan=False))
     else:

@@ -10,7 +10,7 @@ import typer
 
 from ...errors import ParameterError
 from ..error_messages import report_errors
-from ..options import Json, ModelFile, Out, Overwrite, Quiet  # noqa: TC001 - read by typer
+from ..options import Json, ModelFile, Out, Overwrite, Quiet
 from ..output import Output
 from .loop_options import (
     PAPER,

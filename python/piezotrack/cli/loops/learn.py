@@ -44,7 +44,7 @@ from .loop_options import (
     simulated,
     unit_of,
 )
-from .track import BeyondReach  # noqa: TC001 - read by typer
+from .track import BeyondReach
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager

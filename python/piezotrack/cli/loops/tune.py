@@ -10,7 +10,7 @@ import typer
 
 from ...errors import ParameterError
 from ..error_messages import report_errors
-from ..options import (  # noqa: TC001 - read by typer
+from ..options import (
     Duration,
     Json,
     ModelFile,

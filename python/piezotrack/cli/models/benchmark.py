@@ -10,18 +10,13 @@ import typer
 
 from ...errors import DataError, ParameterError
 from ..error_messages import report_errors
+from ..option_groups import Columns, with_groups
 from ..options import (
-    Columns,
     Decimate,
-    DisplacementColumn,
-    DriveColumn,
     HoldOption,
-    Interval,
     Json,
     Quiet,
     Resample,
-    TimeColumn,
-    Units,
     can_be_folder,
     of_file,
     refuse_without_effect,
@@ -41,6 +36,7 @@ SAID = ("train", "test", "other", "other-test")
 
 
 @report_errors
+@with_groups
 def benchmark_command(
     context: typer.Context,
     files: Annotated[
@@ -82,11 +78,8 @@ def benchmark_command(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Compute again what the folder has.")
     ] = False,
-    time: TimeColumn = None,
-    drive: DriveColumn = None,
-    displacement: DisplacementColumn = None,
-    unit: Units = None,
-    dt: Interval = None,
+    *,
+    columns: Columns,
     resample: Resample = None,
     decimate: Decimate = None,
     hold: HoldOption = "foh",
@@ -99,14 +92,13 @@ def benchmark_command(
     if not files:
         refuse_without_effect(context, ("train", "test"), "without a FILE")
     if not files and listed is None:
-        columns = ("time", "drive", "displacement", "unit", "dt", "resample", "decimate", "hold")
-        refuse_without_effect(context, columns, "without a FILE or --list")
+        names = ("time", "drive", "displacement", "unit", "dt", "resample", "decimate", "hold")
+        refuse_without_effect(context, names, "without a FILE or --list")
     result = Output(out, overwrite=True, json=json, quiet=quiet)
     can_be_folder(out)
-    reading = Columns(time, drive, displacement, unit, dt, decimate)
 
     def read(file: Path) -> Dataset:
-        return reading.read(file, hold, resample)
+        return columns.read(file, hold, resample, decimate=decimate)
 
     records: list[str | BenchmarkRecord] = list(record or [])
     records += [_record(file, read(file), train, test, None) for file in files or []]

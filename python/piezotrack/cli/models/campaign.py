@@ -12,45 +12,18 @@ import typer
 from ...errors import DataError, Interrupted, ParameterError
 from ..error_messages import report_errors
 from ..interruption import acknowledge_interrupt
-from ..options import (
-    Columns,
-    Decimate,
-    DisplacementColumn,
-    DriveColumn,
-    HoldOption,
-    Interval,
-    Json,
-    MissingOption,
-    Quiet,
-    Resample,
-    TimeColumn,
-    Units,
-    Zero,
-    can_be_folder,
-    refuse_without_effect,
-    windowed,
-)
+from ..option_groups import HeldLogOptions, with_groups
+from ..options import Json, Quiet, can_be_folder, refuse_without_effect, windowed
 from ..output import Output
 from .fit_options import (
-    Asymmetry,
-    Bound,
-    Constrain,
-    Creep,
     Delay,
     Drift,
-    Dynamics,
     FitOptions,
-    Fix,
-    Free,
     History,
     Kinds,
     KindsNamed,
-    Method,
-    Plays,
-    Priors,
-    Scales,
-    Swarm,
-    Ties,
+    MethodOptions,
+    ParameterOptions,
     Windows,
     delay_asked,
     drift_asked,
@@ -68,6 +41,7 @@ PARQUET = "campaign.parquet"
 
 
 @report_errors
+@with_groups
 def campaign_command(
     context: typer.Context,
     files: Annotated[
@@ -97,36 +71,14 @@ def campaign_command(
     parquet: Annotated[
         bool, typer.Option("--parquet", help=f"Write the table to {PARQUET} too.")
     ] = False,
-    time: TimeColumn = None,
-    drive: DriveColumn = None,
-    displacement: DisplacementColumn = None,
-    unit: Units = None,
-    dt: Interval = None,
-    resample: Resample = None,
-    decimate: Decimate = None,
-    zero: Zero = False,
-    missing: MissingOption = None,
-    hold: HoldOption = "foh",
-    free: Free = None,
-    fix: Fix = None,
-    bound: Bound = None,
-    scale: Scales = None,
-    tie: Ties = None,
-    constrain: Constrain = None,
-    prior: Priors = None,
-    stiffness: Annotated[
-        float | None, typer.Option(help="Stiffness in N/m, if known; default a nominal 1e6.")
-    ] = None,
+    *,
+    reading: HeldLogOptions,
+    parameters: ParameterOptions,
     offset: Annotated[bool, typer.Option(help="Fit a constant sensor offset.")] = True,
     delay: Delay = None,
     drift: Drift = None,
     history: History = None,
-    creep: Creep = None,
-    plays: Plays = None,
-    asymmetry: Asymmetry = None,
-    dynamics: Dynamics = None,
-    method: Method = None,
-    swarm: Swarm = None,
+    searching: MethodOptions,
     runs: Annotated[
         int | None,
         typer.Option(help="Number of independent searches; default 1, of swarms 4."),
@@ -147,23 +99,7 @@ def campaign_command(
     can_be_folder(out)
     if parquet:
         check_parquet()
-    options = FitOptions(
-        free=free,
-        fix=fix,
-        bound=bound,
-        scale=scale,
-        tie=tie,
-        constrain=constrain,
-        prior=prior,
-        stiffness=stiffness,
-        creep=creep,
-        plays=plays,
-        asymmetry=asymmetry,
-        dynamics=dynamics,
-        method=method,
-        swarm=swarm,
-        runs=runs,
-    )
+    options = FitOptions(**vars(parameters), **vars(searching), runs=runs)
     options.check()
     kinds.refuse_of_others(context)
     of_record = {
@@ -176,10 +112,9 @@ def campaign_command(
         kind: {"model": kind, **of_record, **options.arguments_of(kind)} for kind in kinds.names
     }
     numbers = _seeds(seeds)
-    columns = Columns(time, drive, displacement, unit, dt, decimate, zero)
     titles, windows = _titles(files), each_of("--window", window, len(files))
     logs = {
-        title: windowed(columns.read(file, hold, resample, missing), file, "--window", one)
+        title: windowed(reading.log(file, reading.hold), file, "--window", one)
         for (title, file), one in zip(titles.items(), windows, strict=True)
     }
     with _executor(workers, dask) as executor:

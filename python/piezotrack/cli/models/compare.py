@@ -9,23 +9,13 @@ import typer
 
 from ...stages.model_info import LISTED
 from ..error_messages import report_errors
+from ..option_groups import HeldLogOptions, with_groups
 from ..options import (
-    Columns,
-    Decimate,
-    DisplacementColumn,
-    DriveColumn,
-    HoldOption,
-    Interval,
     Json,
     LogFile,
-    MissingOption,
     Out,
     Overwrite,
     Quiet,
-    Resample,
-    TimeColumn,
-    Units,
-    Zero,
     of_file,
     refuse_without_effect,
     seconds,
@@ -37,6 +27,7 @@ __all__ = ["compare_command"]
 
 
 @report_errors
+@with_groups
 def compare_command(
     context: typer.Context,
     file: LogFile,
@@ -62,16 +53,8 @@ def compare_command(
     ] = None,
     out: Out = Path("comparison"),
     overwrite: Overwrite = False,
-    time: TimeColumn = None,
-    drive: DriveColumn = None,
-    displacement: DisplacementColumn = None,
-    unit: Units = None,
-    dt: Interval = None,
-    resample: Resample = None,
-    decimate: Decimate = None,
-    zero: Zero = False,
-    missing: MissingOption = None,
-    hold: HoldOption = "foh",
+    *,
+    reading: HeldLogOptions,
     seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
     runs: Annotated[int, typer.Option(help="Number of independent searches.")] = 1,
     threads: Annotated[
@@ -91,13 +74,12 @@ def compare_command(
         )
 
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    columns = Columns(time, drive, displacement, unit, dt, decimate, zero)
-    log = columns.read(file, hold, resample, missing)
+    log = reading.log(file, reading.hold)
     fitted = None if train is None else seconds("--train", train)
     judged = None if test is None else seconds("--test", test)
     second = None
     if test_log is not None:
-        second = windowed(columns.read(test_log, hold, resample, missing), test_log, "--test", test)
+        second = windowed(reading.log(test_log, reading.hold), test_log, "--test", test)
     # A model file that is given is written as it is.
     given = {Path(name).resolve() for name in model or []}
     with of_file(file):

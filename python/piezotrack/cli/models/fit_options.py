@@ -25,27 +25,17 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AUTO",
-    "Asymmetry",
-    "Bound",
-    "Constrain",
-    "Creep",
     "Delay",
     "Delays",
     "Drifts",
-    "Dynamics",
     "FitOptions",
-    "Fix",
-    "Free",
     "Histories",
     "History",
     "Kinds",
     "KindsNamed",
     "LogFiles",
-    "Plays",
-    "Priors",
-    "Scales",
-    "Swarm",
-    "Ties",
+    "MethodOptions",
+    "ParameterOptions",
     "Weights",
     "Windows",
     "check_each_log",
@@ -308,23 +298,37 @@ def _of_plays(name: str) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FitOptions:
+class ParameterOptions:
+    """Options on the parameters of a model."""
+
+    free: Free = None
+    fix: Fix = None
+    bound: Bound = None
+    scale: Scales = None
+    tie: Ties = None
+    constrain: Constrain = None
+    prior: Priors = None
+    stiffness: Annotated[
+        float | None, typer.Option(help="Stiffness in N/m, if known; default a nominal 1e6.")
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MethodOptions:
+    """Options on the structure of a model and on what searches."""
+
+    creep: Creep = None
+    plays: Plays = None
+    asymmetry: Asymmetry = None
+    dynamics: Dynamics = None
+    method: Method = None
+    swarm: Swarm = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitOptions(ParameterOptions, MethodOptions):
     """Options of a fit, as they are typed; None stands for what was not given."""
 
-    free: str | None
-    fix: list[str] | None
-    bound: list[str] | None
-    scale: list[str] | None
-    tie: list[str] | None
-    constrain: list[str] | None
-    prior: list[str] | None
-    stiffness: float | None
-    creep: str | None
-    plays: int | None
-    asymmetry: int | None
-    dynamics: str | None
-    method: Literal["descents", "swarm"] | None
-    swarm: str | None
     seed: int | None = None
     runs: int | None
 

@@ -13,49 +13,20 @@ from ..._support.display.progress_parts import Parts
 from ...errors import Interrupted, ParameterError
 from ..error_messages import report_errors
 from ..interruption import acknowledge_interrupt
-from ..options import (
-    Columns,
-    Decimate,
-    DisplacementColumn,
-    DriveColumn,
-    HoldOption,
-    Interval,
-    Json,
-    MissingOption,
-    Out,
-    Overwrite,
-    Quiet,
-    Resample,
-    Seconds,
-    TimeColumn,
-    Units,
-    Zero,
-    of_file,
-    windowed,
-)
+from ..option_groups import HeldLogOptions, with_groups
+from ..options import Json, Out, Overwrite, Quiet, Seconds, of_file, windowed
 from ..output import Output
 from .fit_options import (
     AUTO,
-    Asymmetry,
-    Bound,
-    Constrain,
-    Creep,
     Delays,
     Drifts,
-    Dynamics,
     FitOptions,
-    Fix,
-    Free,
     Histories,
     Kinds,
     KindsNamed,
     LogFiles,
-    Method,
-    Plays,
-    Priors,
-    Scales,
-    Swarm,
-    Ties,
+    MethodOptions,
+    ParameterOptions,
     Weights,
     Windows,
     check_each_log,
@@ -79,6 +50,7 @@ PANELS = ("loop", "time")
 
 
 @report_errors
+@with_groups
 def identify_command(
     context: typer.Context,
     files: LogFiles,
@@ -87,36 +59,14 @@ def identify_command(
     model: KindsNamed = None,
     out: Out = Path("results"),
     overwrite: Overwrite = False,
-    time: TimeColumn = None,
-    drive: DriveColumn = None,
-    displacement: DisplacementColumn = None,
-    unit: Units = None,
-    dt: Interval = None,
-    resample: Resample = None,
-    decimate: Decimate = None,
-    zero: Zero = False,
-    missing: MissingOption = None,
-    hold: HoldOption = "foh",
-    free: Free = None,
-    fix: Fix = None,
-    bound: Bound = None,
-    scale: Scales = None,
-    tie: Ties = None,
-    constrain: Constrain = None,
-    prior: Priors = None,
-    stiffness: Annotated[
-        float | None, typer.Option(help="Stiffness in N/m, if known; default a nominal 1e6.")
-    ] = None,
+    *,
+    reading: HeldLogOptions,
+    parameters: ParameterOptions,
     offset: Annotated[bool, typer.Option(help="Fit a constant sensor offset.")] = True,
     delay: Delays = None,
     drift: Drifts = None,
     history: Histories = None,
-    creep: Creep = None,
-    plays: Plays = None,
-    asymmetry: Asymmetry = None,
-    dynamics: Dynamics = None,
-    method: Method = None,
-    swarm: Swarm = None,
+    searching: MethodOptions,
     seed: Annotated[int | None, typer.Option(help="Seed of the random numbers; default 0.")] = None,
     runs: Annotated[
         int | None,
@@ -145,40 +95,22 @@ def identify_command(
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    options = FitOptions(
-        free=free,
-        fix=fix,
-        bound=bound,
-        scale=scale,
-        tie=tie,
-        constrain=constrain,
-        prior=prior,
-        stiffness=stiffness,
-        creep=creep,
-        plays=plays,
-        asymmetry=asymmetry,
-        dynamics=dynamics,
-        method=method,
-        swarm=swarm,
-        seed=seed,
-        runs=runs,
-    )
+    options = FitOptions(**vars(parameters), **vars(searching), seed=seed, runs=runs)
     options.check()
     kinds.refuse_of_others(context)
     check_each_log(len(files), delay=delay, drift=drift, history=history, weight=weight)
     if checkpoint is not None and len(kinds.names) > 1:
         raise ParameterError("--checkpoint", "given with several models", "one")
-    columns = Columns(time, drive, displacement, unit, dt, decimate, zero)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")
     windows = each_of("--window", window, len(files))
     logs = [
-        windowed(columns.read(file, hold, resample, missing), file, "--window", one)
+        windowed(reading.log(file, reading.hold), file, "--window", one)
         for file, one in zip(files, windows, strict=True)
     ]
     second = None
     if validate is not None:
-        whole = columns.read(validate, hold, resample, missing)
+        whole = reading.log(validate, reading.hold)
         second = windowed(whole, validate, "--validate-window", validate_window)
     records = of_each_log(
         logs, offset=offset, delay=delay, drift=drift, history=history, weight=weight

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from ..error_messages import report_errors
+from ..option_groups import Columns
 from ..options import (
-    Columns,
     DisplacementColumn,
     Interval,
     Json,
@@ -52,10 +52,8 @@ def noise_command(
     from ...data.reader import read_displacement
     from ...identification.experiments.sensor_noise import identify_noise
 
-    columns = Columns(time, None, displacement, unit, dt)
-    log = read_displacement(
-        file, time=columns.time, displacement=columns.displacement, units=columns.units, dt=dt
-    )
+    columns = Columns(time=time, displacement=displacement, unit=unit, dt=dt)
+    log = read_displacement(file, **columns.arguments)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["noise.json", *picture_files("noise")])
     log = windowed(log, file, "--window", window)

@@ -9,8 +9,8 @@ import typer
 
 from ...errors import ParameterError
 from ..error_messages import report_errors
+from ..option_groups import Columns
 from ..options import (
-    Columns,
     DriveColumn,
     HoldOption,
     Interval,
@@ -51,12 +51,13 @@ def simulate_command(
         write_columns,
     )
     from ..._support.units import drive_word, shown_unit
+    from ...data.reader import drive_dataset
     from ...identification.fitted.model_file import load
     from ...identification.views.plot import plot_response
 
     known = load(model)
-    columns = Columns(time, drive, None, unit, dt)
-    log = columns.read_drive(drive_file)
+    columns = Columns(time=time, drive=drive, unit=unit, dt=dt)
+    log = drive_dataset(drive_file, **columns.arguments)
     name, scale = shown_unit(known.drive_unit)
     if log.drive_unit != known.drive_unit and "m" in (log.drive_unit, known.drive_unit):
         raise ParameterError(

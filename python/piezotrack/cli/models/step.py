@@ -9,20 +9,15 @@ import typer
 
 from ...errors import ParameterError
 from ..error_messages import report_errors
+from ..option_groups import Columns, with_groups
 from ..options import (
-    Columns,
-    DisplacementColumn,
-    DriveColumn,
     HoldOption,
-    Interval,
     Json,
     MissingOption,
     Out,
     Overwrite,
     Quiet,
     Resample,
-    TimeColumn,
-    Units,
     number,
     of_file,
     windowed,
@@ -33,6 +28,7 @@ __all__ = ["step_command"]
 
 
 @report_errors
+@with_groups
 def step_command(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Log of a step response.")],
     window: Annotated[
@@ -41,11 +37,8 @@ def step_command(
     ] = None,
     out: Out = Path("results"),
     overwrite: Overwrite = False,
-    time: TimeColumn = None,
-    drive: DriveColumn = None,
-    displacement: DisplacementColumn = None,
-    unit: Units = None,
-    dt: Interval = None,
+    *,
+    columns: Columns,
     resample: Resample = None,
     missing: MissingOption = None,
     hold: HoldOption = "zoh",
@@ -70,7 +63,7 @@ def step_command(
     from ..._support.files.writing import picture_files
     from ...identification.experiments.step_response import identify_step
 
-    log = Columns(time, drive, displacement, unit, dt).read(file, hold, resample, missing)
+    log = columns.read(file, hold, resample, missing)
     log = windowed(log, file, "--window", window)
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["step.json", *picture_files("step")])
