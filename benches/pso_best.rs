@@ -67,6 +67,21 @@ fn main() {
             alone / each
         );
     }
+    #[cfg(target_arch = "x86_64")]
+    if let Some(simd) = pulp::x86::V3::try_new() {
+        let ten = paper::candidates(&problem, 10);
+        let four = Evaluator::new(&record, &problem, NEVER).on(Arch::V3(simd));
+        for threads in [1, 2] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let time = pool.install(|| {
+                best(|| {
+                    black_box(four.costs(black_box(&ten), NEVER));
+                })
+            });
+            let step = time / f64::from(SAMPLES);
+            println!("AVX2, 10 particles, {threads} threads: {step:.1} ns a step of all");
+        }
+    }
     let share = OPERATIONS / peak / whole(lanes) / alone;
     println!("{:.0} % of the multiply-add peak for {OPERATIONS} operations", 100.0 * share);
 }

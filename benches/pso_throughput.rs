@@ -63,6 +63,22 @@ fn throughput(criterion: &mut Criterion) {
     }
     group.finish();
 
+    // A step of all particles together: the time is that of 20 001 steps.
+    let mut group = criterion.benchmark_group("10 particles, instruction sets and threads");
+    for (name, arch) in instruction_sets().into_iter().skip(1) {
+        for threads in [1, 2] {
+            let ten = candidates(&problem, 10);
+            costs(
+                &mut group,
+                &format!("{name}, {threads} threads"),
+                &evaluator().on(arch),
+                &ten,
+                threads,
+            );
+        }
+    }
+    group.finish();
+
     let mut group = criterion.benchmark_group("instruction sets, one thread");
     for (name, arch) in instruction_sets() {
         let second = evaluator().on(arch);

@@ -66,6 +66,28 @@ fn one_lane_and_many_on_every_instruction_set() {
     }
 }
 
+/// However many candidates share a bundle, and bundles a thread.
+#[test]
+fn every_number_of_candidates_on_any_number_of_threads() {
+    let (u, y) = log();
+    let record = Record::new(&u[..1500], &y[..1500], DT, Hold::First, 100).unwrap();
+    let problem = Problem::new(&record, &spec(), NEVER).unwrap();
+    let asked = candidates(&problem);
+    let evaluator = |arch| Evaluator::new(&record, &problem, NEVER).on(arch);
+    let alone = evaluator(Arch::new());
+    let expected: Vec<_> = asked.iter().flat_map(|one| bits(&alone, &[*one])).collect();
+    for arch in instruction_sets() {
+        let evaluator = evaluator(arch);
+        for threads in [1, 2, 5] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            for count in [3, 5, 9, 10, 13, 23] {
+                let found = pool.install(|| bits(&evaluator, &asked[..count]));
+                assert_eq!(found, expected[..count], "{arch:?}, {threads} threads, {count}");
+            }
+        }
+    }
+}
+
 fn on_every_instruction_set(spec: &Spec) {
     let (u, y) = log();
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();

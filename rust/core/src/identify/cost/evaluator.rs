@@ -195,14 +195,17 @@ impl<'a> KernelVisitor for All<'a> {
     fn visit<K: Kernel>(self, kernel: K) -> Vec<Simulated> {
         let Self { of, candidates, stride, stop } = self;
         let width = width(of.arch);
-        // Every thread gets vectors to fill before any gets a second one.
         let vectors = candidates.len().div_ceil(width);
         // A delay reads a ring in memory, which several vectors do not make faster.
         let several =
             const { K::VECTORS > 1 } && width > 1 && !of.problem.has_delay() && stride == 0;
-        let most = if several { K::VECTORS } else { 1 };
-        let each = vectors.div_ceil(rayon::current_num_threads()).clamp(1, most);
-        let size = candidates.len().div_ceil(vectors.div_ceil(each).max(1)).max(1);
+        // Every thread gets one vector before any gets more; then a bundle of several, which takes as
+        // long however few of its lanes are filled, is filled before the next.
+        let size = if several && vectors > rayon::current_num_threads() {
+            K::VECTORS * width
+        } else {
+            candidates.len().div_ceil(vectors.max(1)).max(1)
+        };
         let bundle = |chunk: &'a [Candidate]| {
             // Only a kernel that gains by several vectors is compiled for them.
             if const { K::VECTORS > 1 } && several && chunk.len() > width {

@@ -59,9 +59,14 @@ pub(in crate::identify::least_squares) fn search<'a>(
     let chosen = choose(&few, settings)?;
     common.count(few.evaluations());
     let mut fit = chosen.on(common);
-    fit.settle(1e-4)?;
-    fit.exact = true;
-    fit.settle(1e-8)?;
+    if settings.start.is_some() {
+        // A trial of many, which is judged and not kept.
+        fit.settle(ROUGH)?;
+    } else {
+        fit.settle(1e-4)?;
+        fit.exact = true;
+        fit.settle(1e-8)?;
+    }
     drop_modes(&mut fit)?;
     Some(fit)
 }
