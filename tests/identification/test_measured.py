@@ -108,7 +108,6 @@ def test_the_papers_swarm_does_better_than_a_straight_line() -> None:
 
 def test_the_warm_up_counts() -> None:
     # What the stage remembers at 3 s is in the drive before.
-    forgetting = pt.identify(
-        datasets.dbo_training().cut(3.0, 23.0), "dahl", method=pt.Descents(seed=1)
-    )
+    cut = datasets.dbo_training().cut(3.0, 23.0)
+    forgetting = pt.identify(cut, "dahl", method=pt.Descents(seed=1), history="virgin")
     assert forgetting.cost > 1.1 * fit(1).cost

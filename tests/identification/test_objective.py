@@ -108,7 +108,7 @@ def test_a_model_that_is_not_searched_has_no_box() -> None:
 def test_ctrl_c_is_raised_and_no_costs_are_made_up() -> None:
     """So many costs take ten seconds."""
     once = log()
-    u, y = np.tile(once.u, 20), np.tile(once.y, 20)
+    u, y = np.tile(once.u, 100), np.tile(once.y, 100)
     cost = pt.identification.Objective(pt.Dataset(u=u, y=y, dt=once.dt), "dahl", parameters=HELD)
     many = places(200_000, cost)
     threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT)).start()
