@@ -22,8 +22,8 @@ __all__ = ["MethodChoice"]
 SEARCHES = {one.name: one for one in (Descents, ParticleSwarm)}
 EXPECTED = "'descents', 'swarm', pt.Descents, pt.ParticleSwarm or pt.LeastSquares"
 # The descent finds the bottom: swarms that only have to find the basin can be short, and those
-# that only have to tell the models apart few.
-ITERATIONS, RUNS = 40, 2
+# that only have to tell the models apart few, as descents do.
+ITERATIONS, RUNS, STARTS = 40, 2, 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +86,9 @@ class MethodChoice:
         return self.search if info.searched else self.weights
 
     def of_trials(self) -> MethodChoice:
-        """Return the methods of the trials of ``model="auto"``: fewer swarms."""
+        """Return the methods of the trials of ``model="auto"``: fewer swarms, fewer descents."""
+        if self.search == Descents(seed=self.search.seed):
+            return replace(self, search=replace(self.search, starts=STARTS))
         if isinstance(self.search, ParticleSwarm) and self.search.runs is None:
             return replace(self, search=replace(self.search, runs=RUNS))
         return self

@@ -43,7 +43,7 @@ pub use records::creep_weights::{CreepWeights, MOST_CREEP, MOST_CREEP_WEIGHTS, c
 pub use records::history::{History, voltages_before};
 pub use records::record::Record;
 pub use records::resonances::{Resonance, resonances};
-pub use search::descents::DescentSettings;
+pub use search::descent_settings::DescentSettings;
 pub use search::plan::{Method, Plan};
 pub use search::progress::{Monitor, Outcome, Progress, StopReason};
 pub use search::swarms::search;

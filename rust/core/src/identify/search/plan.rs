@@ -1,6 +1,6 @@
 //! How a problem is searched: by which method, from which seed, how often.
 
-use super::descents::DescentSettings;
+use super::descent_settings::DescentSettings;
 use crate::error::{Error, Result};
 use crate::identify::swarm::SwarmSettings;
 use crate::math::available;
