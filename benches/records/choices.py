@@ -94,7 +94,7 @@ def made(seed: int) -> Made:
     if dynamics == 1:
         late = dt * 10 ** rng.uniform(-0.5, 1)
         e = np.exp(-dt / late)
-        held = (1 - e) * late / dt
+        held = e if sort == 2 else (1 - e) * late / dt
         x = lfilter([1 - held, held - e], [1, -e], x - x[0]) + x[0]
     elif dynamics == 2 and sort == 3:
         wn, zeta = 2 * np.pi * rng.uniform(0.02, 0.2) / dt, 10 ** rng.uniform(-2, -0.3)
@@ -102,6 +102,9 @@ def made(seed: int) -> Made:
         continuous = tuple(np.array(one, dtype=float) for one in rows)
         b, a = ss2tf(*(np.asarray(one) for one in cont2discrete(continuous, dt, "foh")[:4]))
         x = lfilter(b[0], a, x - x[0]) + x[0]
+    if sort == 2:
+        # A drive that is held acts after its sample.
+        x = np.concatenate((x[:1], x[:-1]))
     stroke = float(np.ptp(x))
     noise = stroke * 10 ** rng.uniform(-4, -2.8)
     y = x + noise * rng.normal(size=t.size) + stroke * rng.uniform(-0.5, 0.5)

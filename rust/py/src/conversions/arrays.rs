@@ -8,14 +8,8 @@ use piezotrack_core::math::room;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyTuple};
 
-use crate::conversions::numbers::is_unsuitable;
+use crate::conversions::numbers::{LARGEST, MOST_SAMPLES, is_unsuitable};
 use crate::errors::{data, raise, shape};
-
-/// Most samples of an array: 4 GB, of which a simulation needs several times as much.
-pub const MOST_SAMPLES: usize = 500_000_000;
-
-/// Size beyond which no sample makes sense, and its square leaves float64 soon.
-pub const LARGEST: f64 = 1e100;
 
 const EXPECTED: &str = "a one-dimensional array of numbers";
 

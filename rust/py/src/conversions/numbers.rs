@@ -5,8 +5,13 @@ use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyComplex, PyFloat, PyInt, PyString};
 
-use crate::conversions::arrays::{LARGEST, MOST_SAMPLES};
 use crate::errors::raise;
+
+/// Most samples of an array: 4 GB, of which a simulation needs several times as much.
+pub const MOST_SAMPLES: usize = 500_000_000;
+
+/// Size beyond which no sample makes sense, and its square leaves float64 soon.
+pub const LARGEST: f64 = 1e100;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("INTERVALS", piezotrack_core::signal::INTERVALS)?;
