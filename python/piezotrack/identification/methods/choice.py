@@ -63,23 +63,27 @@ class MethodChoice:
             It is no method, does not apply to the model, or names two that search.
         """
         given = method if isinstance(method, (list, tuple)) else () if method is None else (method,)
-        found: dict[str, Any] = {}
+        methods: dict[str, Any] = {}
         for entry in given:
             checked = _named(entry, any_model=info is None)
             place = "weights" if isinstance(checked, LeastSquares) else "search"
-            if place in found:
+            if place in methods:
                 raise ParameterError(
                     "method", quoted(method), "one that searches, and one LeastSquares"
                 )
-            found[place] = checked
-        if found and info is not None and ("search" if info.searched else "weights") not in found:
+            methods[place] = checked
+        if (
+            methods
+            and info is not None
+            and ("search" if info.searched else "weights") not in methods
+        ):
             how = "are searched" if info.searched else "follow by least squares"
             raise ParameterError(
                 "method",
                 quoted(method),
                 f"another one with the model '{info.name}', whose parameters {how}",
             )
-        return cls(**found)
+        return cls(**methods)
 
     def method(self, info: ModelInfo) -> Method:
         """Return the one by which a model is found."""

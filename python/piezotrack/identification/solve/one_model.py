@@ -120,9 +120,9 @@ def _with_history_shown(problem: Problem, method: Search, run: Run) -> Identific
     for other in earlier_motion(replace(problem, records=(shown,)), virgin, alone, run.threads):
         if other.share * alone < (1.0 - GAIN) * least:
             with parts.begin(1):
-                found = search_parameters(
+                other_fit = search_parameters(
                     with_history(other.history), method, run, virgin if swarms else None
                 )
-            if found.cost < (1.0 - GAIN) * least:
-                fit, least = found, found.cost
+            if other_fit.cost < (1.0 - GAIN) * least:
+                fit, least = other_fit, other_fit.cost
     return fit

@@ -100,13 +100,13 @@ def posterior_models(
     begins = _Beginning(model, data)
     columns = np.column_stack([begins.sensitivity(value) for value in values])
     axes = _axes(columns, begins.residual(model))
-    found = []
+    models = []
     for axis in axes:
         for way in (deviations, -deviations):
             moved = _moved(model, values, way * axis)
             if moved is not None:
-                found.append(moved)
-    return tuple(found)
+                models.append(moved)
+    return tuple(models)
 
 
 class _Beginning:
@@ -142,16 +142,16 @@ class _Beginning:
 def _fitted(model: IdentifiedModel) -> list[_Value]:
     """Name the values that were fitted and are not 0."""
     entries = model.document()["parameters"]
-    found = []
+    fitted = []
     for name in model.model.parameter_names():
         value = getattr(model.model, name)
         if value is None or not entries.get(name, {}).get("free", False):
             continue
         if isinstance(value, tuple):
-            found += [_Value(name, k) for k, one in enumerate(value) if one != 0.0]
+            fitted += [_Value(name, k) for k, one in enumerate(value) if one != 0.0]
         elif value != 0.0:
-            found.append(_Value(name, None))
-    return found
+            fitted.append(_Value(name, None))
+    return fitted
 
 
 def _axes(columns: Array, residual: Array) -> list[Array]:

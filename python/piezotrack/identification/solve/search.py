@@ -79,7 +79,7 @@ def search_parameters(
         searcher, runs = DESCENTS, 1
         (start,) = starts(Objective._of(problem, run.threads), swarm).tolist()
     with ProgressBar(run.progress, f"identify: {info.name}") as bar:
-        found = _core.identify(
+        outcome = _core.identify(
             problem,
             method=searcher._core,
             seed=method.seed,
@@ -90,9 +90,9 @@ def search_parameters(
             progress=bar.update,
             checkpoint=run.checkpoint,
         )
-    if found is None:
+    if outcome is None:
         raise Interrupted("interrupted before the first cost was computed")
-    fit = _identification(problem, found, method)
+    fit = _identification(problem, outcome, method)
     if swarm is not None:
         fit = _after_swarm(fit, swarm)
     if not fit.success:
@@ -148,23 +148,23 @@ def _after_swarm(fit: Identification, swarm: Identification) -> Identification:
 
 
 def _identification(
-    problem: Problem, found: _core.Search, method: Descents | ParticleSwarm
+    problem: Problem, outcome: _core.Search, method: Descents | ParticleSwarm
 ) -> Identification:
     info, records = problem.info, problem.records
     drive_unit = records[0].data.drive_unit
     facts = {one.name: (one.unit, one.symbol) for one in info.parameters} | SENSOR
     facts = {name: (of_drive(unit, drive_unit), sign) for name, (unit, sign) in facts.items()}
-    parameters = {one["name"]: _estimate(one, *facts[one["name"]]) for one in found.estimates}
+    parameters = {one["name"]: _estimate(one, *facts[one["name"]]) for one in outcome.estimates}
     values = {name: [estimate.value] for name, estimate in parameters.items()}
-    values["creep_weights"], values["creep_times"] = found.creep
+    values["creep_weights"], values["creep_times"] = outcome.creep
     model = stage_class(info)._from(values.items())
     fitted = tuple(
-        _fitted(model, one, own, facts) for one, own in zip(records, found.records, strict=True)
+        _fitted(model, one, own, facts) for one, own in zip(records, outcome.records, strict=True)
     )
     first, data = fitted[0], records[0].data
     parameters |= first.parameters
     spread = deviation_of([(one.data, one.weight) for one in records])
-    constraints = tuple(Constraint(*one) for one in found.constraints)
+    constraints = tuple(Constraint(*one) for one in outcome.constraints)
     details: dict[str, Any] = {
         "parameters": {
             parameter.name: details_of(parameters[parameter.name])
@@ -175,67 +175,67 @@ def _identification(
         "delay": details_of(parameters["delay"]) if "delay" in parameters else {},
         **constraint_entries(constraints),
         "fit": {
-            **fit_entry(found.rms, data, found.rms_with_priors, spread),
-            "iterations": found.iterations,
-            "simulations": sum(nfev for _, _, nfev, _ in found.runs),
-            "polish_simulations": found.polish_evaluations,
-            "failed_simulations": found.failures,
-            "stop_reason": found.stop_reason,
-            "runs": [{"cost": cost, "stop_reason": reason} for cost, _, _, reason in found.runs],
-            "substeps": found.substeps,
-            "order": found.order,
+            **fit_entry(outcome.rms, data, outcome.rms_with_priors, spread),
+            "iterations": outcome.iterations,
+            "simulations": sum(nfev for _, _, nfev, _ in outcome.runs),
+            "polish_simulations": outcome.polish_evaluations,
+            "failed_simulations": outcome.failures,
+            "stop_reason": outcome.stop_reason,
+            "runs": [{"cost": cost, "stop_reason": reason} for cost, _, _, reason in outcome.runs],
+            "substeps": outcome.substeps,
+            "order": outcome.order,
         },
         "provenance": provenance(data, seed=method.seed, **{method.name: method.settings()}),
     }
     return Identification(
-        lags=None if found.lags is None else LagRange(*found.lags),
+        lags=None if outcome.lags is None else LagRange(*outcome.lags),
         model=model,
         start=first.start,
         delay=first.delay,
         offset=first.offset,
         offset_fitted=first.offset_fitted,
         drift=first.drift,
-        scale_assumed=found.scale_assumed,
+        scale_assumed=outcome.scale_assumed,
         stroke=max(one.stroke for one in fitted),
         records=fitted,
         details=details,
         data=data,
         parameters=parameters,
         constraints=constraints,
-        cost=found.rms,
-        nfev=sum(nfev for _, _, nfev, _ in found.runs),
-        stop_reason=found.stop_reason,
+        cost=outcome.rms,
+        nfev=sum(nfev for _, _, nfev, _ in outcome.runs),
+        stop_reason=outcome.stop_reason,
         method=method,
         search=SearchRun(
-            runs=tuple(SwarmRun(*run) for run in found.runs),
-            agreeing_runs=found.agreeing,
-            history=found.history,
-            nit=found.iterations,
-            nfail=found.failures,
-            npolish=found.polish_evaluations,
-            substeps=found.substeps,
-            order=found.order,
+            runs=tuple(SwarmRun(*run) for run in outcome.runs),
+            agreeing_runs=outcome.agreeing,
+            history=outcome.history,
+            nit=outcome.iterations,
+            nfail=outcome.failures,
+            npolish=outcome.polish_evaluations,
+            substeps=outcome.substeps,
+            order=outcome.order,
             scales={name: one.scale for name, one in problem.parameters.items() if one.scale},
-            cost_with_priors=found.rms_with_priors,
+            cost_with_priors=outcome.rms_with_priors,
         ),
     )
 
 
-def _estimate(found: Mapping[str, Any], unit: str, symbol: str) -> Estimate:
+def _estimate(entry: Mapping[str, Any], unit: str, symbol: str) -> Estimate:
     """Return what a search found of a parameter."""
-    bounds, deviation, at_bound = found["bounds"], found["deviation"], found["at_bound"]
-    known = {name: found[name] for name in ("scale", "tie", "prior")}
-    value = found["value"]
+    bounds, deviation, at_bound = entry["bounds"], entry["deviation"], entry["at_bound"]
+    known = {name: entry[name] for name in ("scale", "tie", "prior")}
+    value = entry["value"]
     free = bounds is not None
     return Estimate(value, unit, symbol, free, bounds, deviation, at_bound, **known)
 
 
 def _fitted(
-    model: Any, record: Record, own: Mapping[str, Any], facts: Mapping[str, tuple[str, str]]
+    model: Any, record: Record, entries: Mapping[str, Any], facts: Mapping[str, tuple[str, str]]
 ) -> FittedRecord:
     """Return what a search found of a record alone."""
     data, history = record.data, record.history or "virgin"
-    estimates = {name: _estimate(own[name], *facts[name]) for name in SENSOR}
+    estimates = {name: _estimate(entries[name], *facts[name]) for name in SENSOR}
     delay, before, time = (estimates[name] for name in SENSOR)
     if delay.value == 0.0 and not delay.free:
         del estimates["delay"]
@@ -243,7 +243,7 @@ def _fitted(
         del estimates["voltage_before"]
     drift = None
     if time.value:
-        drift = Drift._fading(own["drift"], time.value, data, time_fitted=time.free)
+        drift = Drift._fading(entries["drift"], time.value, data, time_fitted=time.free)
     else:
         del estimates["drift_time"]
     voltage = before.value if history == "fit" else None
@@ -251,11 +251,11 @@ def _fitted(
         data=data,
         weight=record.weight,
         delay=delay.value,
-        offset=own["offset"],
+        offset=entries["offset"],
         offset_fitted=record.offset,
         drift=drift,
         start=start_after(model, data, history, voltage, creeps=False),
-        cost=own["rms"],
+        cost=entries["rms"],
         stroke=data.stroke,
         parameters=estimates,
         origin=origin_of(data),

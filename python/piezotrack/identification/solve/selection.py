@@ -271,12 +271,12 @@ def repeated(data: Dataset) -> float:
     return float(np.std(data.y[best:] - data.y[:-best])) / math.sqrt(2.0)
 
 
-def best_of(found: Sequence[Tried], better: float = BETTER) -> Tried:
+def best_of(tried: Sequence[Tried], better: float = BETTER) -> Tried:
     """Return the best trial, or one before it in the list that is hardly worse.
 
     Parameters
     ----------
-    found : sequence of Tried
+    tried : sequence of Tried
         At least one, in the order in which they were tried. One whose inverse is ill-conditioned
         is taken only where those of all are.
     better : float, optional
@@ -287,7 +287,7 @@ def best_of(found: Sequence[Tried], better: float = BETTER) -> Tried:
     Tried
         The one to take.
     """
-    well = [one for one in found if not one.ill] or list(found)
+    well = [one for one in tried if not one.ill] or list(tried)
     best = well[0]
     for other in well[1:]:
         if other.trial.rms < (1.0 - better) * best.trial.rms:
@@ -295,14 +295,14 @@ def best_of(found: Sequence[Tried], better: float = BETTER) -> Tried:
     return best
 
 
-def with_trials(fit: Identification, found: Sequence[Tried], until: float) -> Identification:
+def with_trials(fit: Identification, tried: Sequence[Tried], until: float) -> Identification:
     """Put into a result what was tried before it.
 
     Parameters
     ----------
     fit : Identification
         The best model.
-    found : sequence of Tried
+    tried : sequence of Tried
         What was tried.
     until : float
         End of the part that the trials were fitted to [s].
@@ -312,7 +312,7 @@ def with_trials(fit: Identification, found: Sequence[Tried], until: float) -> Id
     Identification
         The same with its trials, in its file too.
     """
-    trials = tuple(sorted((one.trial for one in found), key=lambda trial: trial.rms))
+    trials = tuple(sorted((one.trial for one in tried), key=lambda trial: trial.rms))
     models = {trial.model: {"rms": trial.rms, "unit": "m"} for trial in trials}
     details = {"selection": {"fitted_until_s": until, "models": models}}
     selection = Selection(trials=trials, fitted_until=until)

@@ -63,14 +63,14 @@ def search_several_records(problem: Problem, method: Search, run: Run) -> Identi
 
 def _with_shown(fit: Identification, record: Record) -> Record:
     """Give a record the history that it shows by the stage that never moved before any."""
-    own = next(one for one in fit.records if one.data is record.data)
+    fitted = next(one for one in fit.records if one.data is record.data)
     # As of another record: the one that was fitted begins as it was assumed to.
     model = replace(
         fit,
         records=(),
         start=None,
-        delay=own.delay,
-        offset_fitted=own.offset_fitted,
-        drift=own.drift,
+        delay=fitted.delay,
+        offset_fitted=fitted.offset_fitted,
+        drift=fitted.drift,
     )
     return replace(record, history=model.start_on(record.data).history)

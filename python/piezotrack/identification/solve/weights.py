@@ -106,7 +106,7 @@ def solve_least_squares(
     info, records = problem.info, problem.records
     data = records[0].data
     longest = max((one.data for one in records), key=lambda one: one.duration)
-    found = _core.identify_weights(
+    solution = _core.identify_weights(
         problem,
         count=settings.count,
         thresholds=_nodes(settings, info),
@@ -117,7 +117,7 @@ def solve_least_squares(
         threads=threads,
     )
     model = stage_class(info)
-    both = zip(records, found.records, strict=True)
+    both = zip(records, solution.records, strict=True)
     fitted = tuple(_fitted(model, info, one, own) for one, own in both)
     spread = deviation_of([(one.data, one.weight) for one in records])
     first = fitted[0]
@@ -128,15 +128,15 @@ def solve_least_squares(
         },
         "delay": {"free": True} if records[0].fits_delay else {},
         "fit": {
-            **fit_entry(found.rms, data, None, spread),
-            "simulations": found.evaluations,
-            "at_bound": found.at_bound,
-            "lag_range": {"value": found.lag_range, "unit": "s"},
+            **fit_entry(solution.rms, data, None, spread),
+            "simulations": solution.evaluations,
+            "at_bound": solution.at_bound,
+            "lag_range": {"value": solution.lag_range, "unit": "s"},
         },
         "provenance": provenance(data, least_squares=settings.settings()),
     }
     return Identification(
-        model=model._from(found.parameters),
+        model=model._from(solution.parameters),
         offset=first.offset,
         offset_fitted=first.offset_fitted,
         drift=first.drift,
@@ -145,12 +145,12 @@ def solve_least_squares(
         records=fitted,
         details=details,
         data=data,
-        cost=found.rms,
-        nfev=found.evaluations,
+        cost=solution.rms,
+        nfev=solution.evaluations,
         stop_reason="solved",
         method=settings,
-        at_bound=any(name in DYNAMICS for name in found.at_bound),
-        lags=_lags(found.lag_range),
+        at_bound=any(name in DYNAMICS for name in solution.at_bound),
+        lags=_lags(solution.lag_range),
         start=first.start,
     )
 
@@ -190,12 +190,14 @@ def _times(settings: LeastSquares, data: Dataset) -> list[float] | None:
     return decades[-MOST_RELAXATIONS:]
 
 
-def _fitted(model: Any, info: ModelInfo, record: Record, own: Mapping[str, Any]) -> FittedRecord:
+def _fitted(
+    model: Any, info: ModelInfo, record: Record, entries: Mapping[str, Any]
+) -> FittedRecord:
     """Return what was found of a record alone."""
     data = record.data
-    drift, offset = None, own["offset"]
-    if own["drift"] is not None:
-        amplitude, time = own["drift"]
+    drift, offset = None, entries["offset"]
+    if entries["drift"] is not None:
+        amplitude, time = entries["drift"]
         begin, end = float(data.t[0]), float(data.t[-1])
         fitted = record.fits_drift_time
         drift = Drift(amplitude=amplitude, time=time, begin=begin, end=end, time_fitted=fitted)
@@ -204,12 +206,14 @@ def _fitted(model: Any, info: ModelInfo, record: Record, own: Mapping[str, Any])
     return FittedRecord(
         data=data,
         weight=record.weight,
-        delay=own["delay"],
+        delay=entries["delay"],
         offset=offset,
         offset_fitted=record.offset,
         drift=drift,
-        start=start_of_fit(data, own["history"], model._state._from(own["start"], info.state)),
-        cost=own["rms"],
+        start=start_of_fit(
+            data, entries["history"], model._state._from(entries["start"], info.state)
+        ),
+        cost=entries["rms"],
         stroke=data.stroke,
         origin=origin_of(data),
     )

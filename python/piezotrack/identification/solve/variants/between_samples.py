@@ -47,13 +47,13 @@ def with_interpolation_tried(
         replace(one, data=one.data.interpolate(FINER)) if quick else one
         for one, quick in zip(problem.records, fast, strict=True)
     )
-    found = identify(replace(problem, records=records))
-    if any(one.start is not None and one.start.history == "rest" for one in found.records):
+    fit_between = identify(replace(problem, records=records))
+    if any(one.start is not None and one.start.history == "rest" for one in fit_between.records):
         return identify(problem)
     # Of "auto" the same model, before all others are tried again.
-    plain = identify(problem.of_model(found.model.info))
-    if found.cost < (1.0 - GAIN) * plain.cost:
-        return _as_measured(found, problem)
+    plain = identify(problem.of_model(fit_between.model.info))
+    if fit_between.cost < (1.0 - GAIN) * plain.cost:
+        return _as_measured(fit_between, problem)
     return plain if plain.model.info.name == problem.model else identify(problem)
 
 

@@ -220,37 +220,35 @@ class _Profile:
             if name not in SENSOR and name not in near and bounds[0] < bounds[1]:
                 near[name] = Parameter(bounds=bounds)
         few = Descents(samples=2, starts=2, rounds=1)
-        found = search(replace(problem, parameters=near), few)
+        refined = search(replace(problem, parameters=near), few)
         start = [
-            coordinate(found.parameters[name].value, low, high, kind)
+            coordinate(refined.parameters[name].value, low, high, kind)
             for name, low, high, kind in objective.coordinates
         ]
         # What ends on a narrow bound, or beside the minimum, is searched as all others are.
         lowest = float(objective.descend(start)[1][0])
-        if found.cost > (1.0 + WORSE) * lowest:
-            found = search(problem, None)
-        return self.described(found, objective)
+        if refined.cost > (1.0 + WORSE) * lowest:
+            refined = search(problem, None)
+        return self.described(refined, objective)
 
-    def described(self, found: Identification, objective: Objective) -> Identification:
+    def described(self, fit: Identification, objective: Objective) -> Identification:
         """Describe the exponent as fitted, and the ranges of the others as those of a search."""
-        parameters = dict(found.parameters)
+        parameters = dict(fit.parameters)
         for name, low, high, _ in objective.coordinates:
             one = parameters[name]
             at_bound = not low < one.value < high
             parameters[name] = one._replace(bounds=(low, high), at_bound=at_bound)
-        spread = self.deviation(found.data.counted(found.data.y).size)
+        spread = self.deviation(fit.data.counted(fit.data.y).size)
         parameters[NAME] = parameters[NAME]._replace(
             free=True,
             bounds=(1.0, MOST),
             deviation=spread,
             at_bound=self.n >= MOST,
         )
-        entries = dict(found.details["parameters"])
+        entries = dict(fit.details["parameters"])
         for name in set(entries) & set(parameters):
             entries[name] = details_of(parameters[name])
-        return replace(
-            found, parameters=parameters, details={**found.details, "parameters": entries}
-        )
+        return replace(fit, parameters=parameters, details={**fit.details, "parameters": entries})
 
 
 def held(problem: Problem, n: float) -> Problem:
