@@ -69,7 +69,7 @@ def test_its_noise_is_that_of_the_readings(fit: pt.identification.Identification
 
 
 def test_slow_drives_stay_on_straight_lines() -> None:
-    """What is interpolated is the band-limited and fast alone: no steps, no triangle, no noise."""
+    """Interpolation of band-limited fast drives alone: no steps, no triangle, no noise."""
     t = np.arange(4000) / 1000.0
     noise = np.random.default_rng(1).normal(size=t.size)
     fast = np.sin(2.0 * np.pi * 150.0 * t)
