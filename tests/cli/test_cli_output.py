@@ -161,11 +161,14 @@ def test_progress_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     result = run(*search)
     assert result.exit_code == 0
     lines = result.stderr.splitlines()
-    left = r"(?:, up to \d+ s left)?"
-    pattern = rf"identify: dahl, (\d+) %{left}, at most \d+ iterations, best \S+ um, \d+ s"
-    shares = [int(found[1]) for line in lines if (found := re.fullmatch(pattern, line))]
-    assert shares
-    assert 0 < max(shares) <= 100
+    # Without a share before the first iteration of all runs.
+    share = r"(?:(\d+) %(?:, up to \d+ s left)?, )?"
+    pattern = rf"identify: dahl, {share}at most \d+ iterations, best \S+ um, \d+ s"
+    reports = [match for line in lines if (match := re.fullmatch(pattern, line))]
+    assert len(reports) > 2
+    shares = [int(match[1]) for match in reports if match[1]]
+    assert shares == sorted(shares)
+    assert all(0 < percent <= 100 for percent in shares)
     assert without_progress(result.stderr) == ""
     quiet = run(*search, "--quiet", "--overwrite")
     assert (quiet.exit_code, quiet.stderr) == (0, "")
