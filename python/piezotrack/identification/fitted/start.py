@@ -32,6 +32,7 @@ __all__ = [
     "begin",
     "checked_history",
     "fingerprint",
+    "least_voltage",
     "same_beginning",
     "start_after",
     "start_at_jump",
@@ -375,6 +376,31 @@ def begin(
     return start_after(model, data, best.history)
 
 
+def least_voltage(cost: Callable[[float], float], ends: tuple[float, float]) -> float:
+    """Search a range for the voltage of least cost: a grid, then golden sections about its best.
+
+    Parameters
+    ----------
+    cost : callable
+        Cost of a voltage [V].
+    ends : (float, float)
+        The range [V].
+
+    Returns
+    -------
+    float
+        The voltage [V].
+    """
+    grid = np.linspace(*ends, GRID)
+    best = int(np.argmin([cost(float(volts)) for volts in grid]))
+    left, right = float(grid[max(best - 1, 0)]), float(grid[min(best + 1, GRID - 1)])
+    share = (5.0**0.5 - 1.0) / 2.0
+    for _ in range(SECTIONS):
+        inner = (right - share * (right - left), left + share * (right - left))
+        left, right = (left, inner[1]) if cost(inner[0]) < cost(inner[1]) else (inner[0], right)
+    return 0.5 * (left + right)
+
+
 def _beginning(data: Dataset) -> Dataset:
     """First part of a long record, with its window."""
     if len(data) <= COMPARED:
@@ -406,16 +432,8 @@ class _Search:
         low, high = float(self.data.full.u.min()), float(self.data.full.u.max())
         reach = 0.5 * (high - low)
         ends = min(low - reach, self.reached[0]), max(high + reach, self.reached[1])
-        grid = np.linspace(*ends, GRID)
-        costs = [self.from_voltage(volts)[1] for volts in grid]
-        best = int(np.argmin(costs))
-        left, right = grid[max(best - 1, 0)], grid[min(best + 1, GRID - 1)]
-        share = (np.sqrt(5.0) - 1.0) / 2.0
-        for _ in range(SECTIONS):
-            inner = (right - share * (right - left), left + share * (right - left))
-            first, second = (self.from_voltage(volts)[1] for volts in inner)
-            left, right = (left, inner[1]) if first < second else (inner[0], right)
-        return self.from_voltage(0.5 * (left + right))[0]
+        volts = least_voltage(lambda volts: self.from_voltage(volts)[1], ends)
+        return self.from_voltage(volts)[0]
 
     def from_voltage(self, volts: float) -> tuple[Start, float]:
         """Start from a voltage, its creep where it fits best, and the rms of the residual."""

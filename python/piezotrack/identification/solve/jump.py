@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import ParameterError
 from ..fitted.model_entries import origin_of, provenance
 from ..fitted.notes import carried_by_first_samples
-from ..fitted.start import GAIN, start_at_jump
+from ..fitted.start import GAIN, least_voltage, start_at_jump
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,9 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["with_rest", "with_rest_tried"]
 
-# Voltages of rest with a fit each, those that a fit is judged with, and sections in which the best
-# one is refined.
-COARSE, GRID, SECTIONS = 9, 33, 16
+# Voltages of rest with a fit each.
+COARSE = 9
 # Fits with a voltage of rest that was found from the one before, at most.
 ROUNDS = 3
 
@@ -126,14 +125,7 @@ def best_voltage(fit: Identification, data: Dataset) -> float | None:
         left = data.counted(data.y - run.x[data.warmup :])[1:]
         return float(np.std(left) if fit.offset_fitted else np.sqrt(np.mean(left**2)))
 
-    grid = np.linspace(*_voltages(data), GRID)
-    best = int(np.argmin([cost(float(volts)) for volts in grid]))
-    left, right = float(grid[max(best - 1, 0)]), float(grid[min(best + 1, GRID - 1)])
-    share = (5.0**0.5 - 1.0) / 2.0
-    for _ in range(SECTIONS):
-        inner = (right - share * (right - left), left + share * (right - left))
-        left, right = (left, inner[1]) if cost(inner[0]) < cost(inner[1]) else (inner[0], right)
-    volts = 0.5 * (left + right)
+    volts = least_voltage(cost, _voltages(data))
     known = fit.start.voltage if fit.start and fit.start.voltage is not None else 0.0
     return volts if cost(volts) < (1.0 - GAIN) * cost(known) else None
 
