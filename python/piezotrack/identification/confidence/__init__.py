@@ -1,0 +1,1 @@
+"""How sure a model is, and what a further record would tell."""
