@@ -12,6 +12,10 @@ from .campaigns.result import TaskResult as TaskResult
 from .comparison.compare import Comparison as Comparison
 from .comparison.compare import ModelScore as ModelScore
 from .comparison.compare import compare as compare
+from .confidence.residual import Ingredient as Ingredient
+from .confidence.residual import Residual as Residual
+from .confidence.residual import ResidualProfile as ResidualProfile
+from .confidence.residual import residual_of as residual_of
 from .confidence.suggested_drive import ExpectedDeviation as ExpectedDeviation
 from .confidence.suggested_drive import SuggestedDrive as SuggestedDrive
 from .confidence.suggested_drive import suggest_drive as suggest_drive

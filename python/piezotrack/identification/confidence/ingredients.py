@@ -27,15 +27,18 @@ CREEPS, SLOW = 4, 0.15
 # How often the regressors of creep are made anew, of the motion beside it.
 PASSES = 2
 # Damping ratios and coarse frequencies of a mode, peaks of the spectrum that are tried.
-DAMPINGS, MODES, PEAKS = (0.006, 0.025, 0.1, 0.4), 24, 6
+DAMPINGS, MODES, PEAKS = (0.006, 0.025, 0.08, 0.25), 24, 6
+# Lowest frequency of a mode, in those of the drive: below it harmonics of the drive are many.
+ABOVE = 4.0
 # Steps of the search of a mode, how far the first one goes and the next ones of it.
-STEPS, FIRST, NEXT, MOST_DAMPED = 6, 1.15, 0.55, 0.95
+STEPS, FIRST, NEXT, MOST_DAMPED = 5, 1.15, 0.55, 0.4
 # Shortest delay in samples, longest in periods, places of a grid, sections between two.
-SHORTEST, LONGEST, PLACES, SECTIONS = 0.02, 1.0 / 6.0, 10, 14
+SHORTEST, LONGEST, PLACES, SECTIONS = 0.02, 1.0 / 6.0, 9, 9
 # Thresholds of bent plays and of those that the rate dilates, of half of the range.
-BENT, DILATED = (0.06, 0.15, 0.3, 0.5, 0.7), (0.08, 0.2, 0.4, 0.65)
+BENT = (0.06, 0.15, 0.3, 0.5, 0.7)
+DILATED = (0.03, 0.07, 0.12, 0.18, 0.25, 0.33, 0.42, 0.53, 0.65, 0.8)
 # Growth of thresholds at the largest rate, of half of the range.
-DILATIONS, LARGEST = (0.02, 0.06, 0.15), 0.995
+DILATIONS, LARGEST = (0.03, 0.08, 0.15), 0.995
 # Degrees of the polynomials of a drift, and its time constants as shares of the window.
 DEGREES, RELAXING = (1, 2, 3, 5, 8), (0.05, 0.1, 0.2, 0.4, 0.8)
 
@@ -138,11 +141,14 @@ def _least(group: Callable[[float], Explained], low: float, high: float) -> Expl
 
 
 def _mode(here: Situation) -> Iterator[Explained]:
-    """A mode that carries a part of the motion, or all of it."""
+    """Part of the motion through a mode, or all of it."""
     dt, x = here.data.dt, here.x
-    low, high = max(3.0 / (here.rest.size * dt), 0.5 / here.period), 0.45 / dt
+    low, high = max(3.0 / (here.rest.size * dt), ABOVE / here.period), 0.45 / dt
     if low >= high:
         return
+
+    def inside(f: float) -> float:
+        return max(low, min(f, high))
 
     def part(f: float, zeta: float) -> tuple[float, float, float]:
         column = here.freed([ringing(x, f * dt, zeta) - x])[0][:, 0]
@@ -155,7 +161,7 @@ def _mode(here: Situation) -> Iterator[Explained]:
         wide = FIRST
         for _ in range(STEPS + 2):
             near = [
-                part(min(f * wide**i, high), min(zeta * wide ** (3 * j), MOST_DAMPED))
+                part(inside(f * wide**i), min(zeta * wide ** (3 * j), MOST_DAMPED))
                 for i in (-1, 0, 1)
                 for j in (-1, 0, 1)
             ]
@@ -174,7 +180,7 @@ def _mode(here: Situation) -> Iterator[Explained]:
     for _ in range(STEPS):
         for along, damped in ((wide, 1.0), (1.0 / wide, 1.0), (1.0, wide**4), (1.0, wide**-4)):
             while True:
-                place = min(f * along, high), min(zeta * damped, MOST_DAMPED)
+                place = inside(f * along), min(zeta * damped, MOST_DAMPED)
                 other = whole(*place)
                 if place == (f, zeta) or other.squares >= (1.0 - 1e-6) * best.squares:
                     break
@@ -219,7 +225,8 @@ def _rate(here: Situation) -> Iterator[Explained]:
         return
     for most in DILATIONS:
         columns = [here.play(here.drive, threshold, most / fastest) for threshold in DILATED]
-        yield here.explained(columns, len(columns) + 1)
+        for chosen in (columns[1::3], columns):
+            yield here.explained(chosen, len(chosen) + 1)
 
 
 def _hum(here: Situation) -> Iterator[Explained]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
@@ -35,13 +36,16 @@ LAGS, CONFIDENCE = 20, 0.99
 # Bins of a profile, and samples from which a bin counts.
 BINS, FEWEST = 16, 4
 # Samples in which an ingredient is looked for, and those needed.
-MOST, LEAST = 40_000, 100
+MOST, LEAST = 20_000, 100
 # Least decrease of the criterion by the ingredient, and its lead over the next one.
 CLEAR, AHEAD = 20.0, 10.0
-# Least share of the systematic residual that it explains beside a loop of another shape, or alone.
-SHARE, ALONE = 0.2, 0.5
+# Least share of the systematic residual that it explains beside a loop of another shape; or both
+# alone, and of what such a loop leaves. Least share of the whole residual.
+SHARE, ALONE, WORTH = 0.2, 0.5, 0.15
 # Difference of what two explain, as a share, that a model which is not exact may make.
 ALIKE = 0.02
+# Share of its square by which the noise is not known.
+UNSURE = 0.05
 
 
 class ResidualProfile(NamedTuple):
@@ -197,9 +201,11 @@ def residual_of(fit: Identification, record: int = 0) -> Residual:
 
     Each ingredient that the model may lack, as creep or a mode, is fitted to the residual as a
     group of regressors, with all that the parameters of the model and a symmetric loop of another
-    shape can do. A cause is named where it explains at least a fifth of what is not noise, with the
-    lowest criterion of Schwarz (1978, doi 10.1214/aos/1176344136) by 10 or more, and 2 % more than
-    any other does. A mode that explains no more than a delay is one.
+    shape can do. A cause is named where it explains at least 15 % of the squared residual beyond
+    that, and a fifth of what is not noise; or half of this alone, and half of what the loop leaves.
+    Its criterion (Schwarz 1978, doi 10.1214/aos/1176344136) is the lowest by 10 or more, and what
+    it explains is more by 2 %, or by what it leaves unexplained itself. A mode that explains no
+    more than a delay is taken for one.
 
     Parameters
     ----------
@@ -211,7 +217,7 @@ def residual_of(fit: Identification, record: int = 0) -> Residual:
     Returns
     -------
     Residual
-        The residual; its causes are looked for in the first 40,000 samples of the window.
+        The residual; its causes are looked for in the first 20,000 samples of the window.
 
     Raises
     ------
@@ -249,7 +255,8 @@ def residual_of(fit: Identification, record: int = 0) -> Residual:
     if data.left_out is not None:
         kept &= ~data.left_out
     read = data.at_readings(values)
-    judged = np.where(data.at_readings(kept), read, read[data.at_readings(kept)].mean())
+    counts = kept if data.inserted is None else kept[~data.inserted]
+    judged = np.where(counts, read, read[counts].mean())
     judged = judged - judged.mean()
     lags = max(1, min(LAGS, judged.size // 5))
     r = autocorrelation(judged, max(lags, judged.size // 4))
@@ -285,8 +292,6 @@ def residual_of(fit: Identification, record: int = 0) -> Residual:
 
 def _explained(result: Residual, fit: Identification, record: int) -> Residual:
     """Look for the ingredients that explain a residual."""
-    from dataclasses import replace
-
     data, start = result.data, fit.records[record].start
     if len(data) > MOST:
         data = data[float(data.t[0]) : float(data.t[MOST])]
@@ -311,7 +316,7 @@ def _explained(result: Residual, fit: Identification, record: int) -> Residual:
             share=1.0 - group.squares / total,
             gain=(left - group.squares) / total,
             alone=here.alone(group),
-            count=group.count,
+            count=group.fitted,
             detail=group.detail,
         )
 
@@ -320,18 +325,23 @@ def _explained(result: Residual, fit: Identification, record: int) -> Residual:
     order = sorted(groups, key=lambda name: -lowered[name])
     found = {name: ingredient(name, groups[name]) for name in order}
     best = found[order[0]]
+    # Two are alike where they differ by less than what the better one cannot explain either.
+    noise = rest.size * result.noise**2 / total
+    unexplained = max(0.0, 1.0 - best.share - noise) + UNSURE * noise
+    tolerance = min(ALIKE * best.gain, unexplained)
     alike = [
         name
         for name in order
-        if lowered[best.name] - lowered[name] < AHEAD
-        or best.gain - found[name].gain < ALIKE * best.gain
+        if lowered[best.name] - lowered[name] < AHEAD or best.gain - found[name].gain < tolerance
     ]
     if "delay" in alike and "mode" in alike:
         # All that a stiff mode does to a slow drive is a delay.
         alike.remove("mode")
     first, shape = found[alike[0]], 1.0 - left / total
-    systematic = max(0.0, 1.0 - rest.size * result.noise**2 / total)
-    explains = first.gain > SHARE * systematic or first.alone > max(shape, ALONE * systematic)
+    systematic = max(0.0, 1.0 - noise)
+    explains = first.gain > max(WORTH, SHARE * systematic) or (
+        first.alone > ALONE * systematic and first.gain > ALONE * (systematic - shape)
+    )
     others = [name for name in order if name not in alike]
     return replace(
         result,
@@ -352,7 +362,7 @@ def _amplitude(u: Array) -> Array:
     """Half of the travel between the turning points around each sample."""
     places = [0, *turns(u), u.size - 1]
     amplitude = np.zeros(u.size)
-    for first, last in zip(places[:-1], places[1:], strict=True):
+    for first, last in pairwise(places):
         amplitude[first : last + 1] = np.ptp(u[first : last + 1]) / 2.0
     return amplitude
 
@@ -368,4 +378,6 @@ def _profile(quantity: str, unit: str, of: Array, values: Array) -> ResidualProf
     squares = np.bincount(place, weights=values**2, minlength=BINS)[kept]
     centres = (low + width * (np.arange(BINS) + 0.5))[kept]
     count = counts[kept]
-    return ResidualProfile(quantity, unit, centres, sums / count, np.sqrt(squares / count))
+    means: Array = np.asarray(sums / count, dtype=np.float64)
+    rms: Array = np.sqrt(np.asarray(squares / count, dtype=np.float64))
+    return ResidualProfile(quantity, unit, np.asarray(centres, dtype=np.float64), means, rms)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from ...data.dataset import Dataset
     from ..fitted.identification import Identification
+    from ..fitted.start import History
 
     Array = NDArray[np.float64]
     Mask = NDArray[np.bool_]
@@ -29,6 +30,8 @@ __all__ = ["Explained", "Situation", "autocorrelation", "criterion", "independen
 STEP = 1e-3
 # Singular values below this share of the largest are not used.
 RANK, SMALL = 1e-9, 1e-6
+# Values of a model whose effects are all taken; of more, those that were fitted and are not 0.
+MOST_VALUES = 64
 # Plays of the drive: at most so many, a play for so many samples, the closer the narrower.
 PLAYS, SAMPLES, BENDS = 28, 60, 1.3
 
@@ -40,7 +43,7 @@ class Explained(NamedTuple):
     ----------
     left : ndarray, shape (n,)
         The residual that remains at the samples that count [m].
-    count : int
+    fitted : int
         Values that were fitted: coefficients, time constants, frequencies.
     detail : str
         The values in words.
@@ -49,7 +52,7 @@ class Explained(NamedTuple):
     """
 
     left: Array
-    count: int
+    fitted: int
     detail: str
     added: Array
 
@@ -199,8 +202,12 @@ class Situation:
         if self.moved:
             # The record may begin otherwise than the fit has it.
             virgin = replace(self, moved=False)
-            for threshold in thresholds[::2]:
+            for threshold in thresholds:
                 yield virgin.play(u, threshold) - self.play(u, threshold)
+            histories: tuple[History, ...] = ("virgin", "settled")
+            for history in histories:
+                other = self.fit.simulate(self.data.full, offset=0.0, history=history)
+                yield other.x - self.x
 
     @cached_property
     def _columns(self) -> Array:
@@ -209,17 +216,29 @@ class Situation:
         if self.fit.delay:
             columns.append(np.gradient(self.x))
         fit, model = self.fit, self.fit.model
-        for parameter in model.info.parameters:
-            value = getattr(model, parameter.name)
-            if value is None or (parameter.held is not None and not parameter.is_list):
+        kept = {one.name for one in model.info.parameters if one.held is None or one.is_list}
+        changes = [
+            (name, changed)
+            for name in model.parameter_names()
+            if name in kept and (value := getattr(model, name)) is not None
+            for changed in _steps(value, zeros=True)
+        ]
+        if len(changes) > MOST_VALUES:
+            entries = fit.details.get("parameters", {})
+            changes = [
+                (name, changed)
+                for name in model.parameter_names()
+                if entries.get(name, {}).get("free", False)
+                and (value := getattr(model, name)) is not None
+                for changed in _steps(value, zeros=False)
+            ]
+        for name, changed in changes:
+            try:
+                other = replace(fit, model=replace(model, **{name: changed}))
+                columns.append(other.simulate(self.data.full, offset=0.0).x - self.x)
+            except PiezotrackError:
+                # A model that does not exist.
                 continue
-            for changed in _steps(value):
-                try:
-                    other = replace(fit, model=replace(model, **{parameter.name: changed}))
-                    columns.append(other.simulate(self.data.full, offset=0.0).x - self.x)
-                except PiezotrackError:
-                    # A model that does not exist.
-                    continue
         return np.stack(columns, axis=1)
 
     def _spanning(self, matrix: Array) -> Array:
@@ -232,15 +251,16 @@ class Situation:
         return spanning
 
 
-def _steps(value: float | tuple[float, ...]) -> Iterator[float | tuple[float, ...]]:
-    """Change a number, or each number of a list in turn, by a small share of it."""
+def _steps(value: float | tuple[float, ...], *, zeros: bool) -> Iterator[float | tuple[float, ...]]:
+    """Change a number, or each of a list in turn, by a small share of it, those of 0 too or not."""
     if not isinstance(value, tuple):
         yield value * (1.0 + STEP) if value else STEP
         return
     size = max(map(abs, value), default=0.0)
     for i, entry in enumerate(value):
-        changed = entry * (1.0 + STEP) if entry else STEP * size
-        yield (*value[:i], changed, *value[i + 1 :])
+        if entry or zeros:
+            changed = entry * (1.0 + STEP) if entry else STEP * size
+            yield (*value[:i], changed, *value[i + 1 :])
 
 
 def criterion(group: Explained, samples: float) -> float:
@@ -262,7 +282,7 @@ def criterion(group: Explained, samples: float) -> float:
         The criterion.
     """
     squares = max(group.squares, 1e-300)
-    return samples * float(np.log(squares)) + group.count * float(np.log(max(samples, 2.0)))
+    return samples * float(np.log(squares)) + group.fitted * float(np.log(max(samples, 2.0)))
 
 
 def independent_samples(values: Array) -> float:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
@@ -81,6 +82,7 @@ class Identification(IdentifiedModel):
         "summary": "identification.views.report:summary_text",
         "html": "identification.views.html:identification_html",
         "convergence": "identification.views.plot:plot_convergence",
+        "residual": "identification.views.confidence.residual_plot:plot_fit_residual",
     }
 
     data: Dataset
@@ -304,6 +306,40 @@ class Identification(IdentifiedModel):
         'best cost, rms [um]'
         """
         drawn: Axes = self.view("convergence")(self, ax)
+        return drawn
+
+    def plot_residual(self, *, record: int = 0, fig: Figure | SubFigure | None = None) -> Figure:
+        """Draw the residual against time, drive, rate and amplitude, and say what explains it.
+
+        `piezotrack.identification.residual_of` has the numbers.
+
+        Parameters
+        ----------
+        record : int, optional
+            Which of several records, from 0.
+        fig : matplotlib.figure.Figure or SubFigure, optional
+            Where to draw; a new figure of pyplot where not given.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure drawn in, with six panels.
+
+        Raises
+        ------
+        ParameterError
+            There is no such record.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:8.0]
+        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+        >>> len(fit.plot_residual(fig=Figure(layout="constrained")).axes)
+        6
+        """
+        drawn: Figure = self.view("residual")(self, record, fig)
         return drawn
 
 

@@ -11,6 +11,7 @@ from ..fitted.start import GAIN
 from ..methods.descents import Descents
 from ..methods.least_squares import LeastSquares
 from ..methods.particle_swarm import ParticleSwarm
+from .confidence.residual_report import cause_notes
 from .quantities import errors_of, errors_of_file, of_sensor, of_stage, rows
 
 if TYPE_CHECKING:
@@ -70,8 +71,18 @@ def summary_text(fit: Identification) -> str:
                 f"history={history!r} end at {fit.cost_um:.4g} um"
             )
     lines += _trials(fit)
-    lines += [*(f"note  {note}" for note in fit.notes), ""]
+    lines += [*(f"note  {note}" for note in _notes(fit)), ""]
     return "\n".join([*lines, *(_estimates(fit) if searched else _values(fit))])
+
+
+def _notes(fit: Identification) -> list[str]:
+    """Return the notes of a fit, with the cause of its residual in place of a mere shape."""
+    causes, notes = cause_notes(fit), fit.notes
+    if any("is asymmetric" in note for note in notes):
+        causes = [note for note in causes if "asymmetric" not in note]
+    elif causes:
+        notes = [note for note in notes if "the loop has a shape" not in note]
+    return [*notes, *causes]
 
 
 def model_text(model: IdentifiedModel) -> str:
