@@ -34,7 +34,7 @@ def correlated(rng: np.random.Generator, count: int, pole: float, size: float) -
 def coverage(u: np.ndarray, pole: float, records: int) -> tuple[float, float]:
     """Shares of intervals of 95 % that cover, and that would if noise were independent."""
     rng = np.random.default_rng(3)
-    clean = STAGE.simulate(u, DT).x
+    clean = STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x
     hits, without = [], []
     truth = np.array([STAGE.linear, *STAGE.weights])
     for _ in range(records):
@@ -72,7 +72,11 @@ def test_what_repeats_is_model_error_and_the_rest_is_noise() -> None:
     u = 40.0 - 40.0 * np.cos(2.0 * np.pi * t)
     rng = np.random.default_rng(1)
     missing = 30e-9 * np.sin(2.0 * np.pi * 5.0 * t)
-    y = STAGE.simulate(u, DT).x + missing + 20e-9 * rng.standard_normal(t.size)
+    y = (
+        STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x
+        + missing
+        + 20e-9 * rng.standard_normal(t.size)
+    )
     fit = pt.identify(
         pt.Dataset(u=u, y=y, dt=DT), "prandtl-ishlinskii", method=METHOD, history="virgin"
     )
@@ -91,7 +95,9 @@ def test_a_mass_without_effect_has_no_interval_and_a_prior_gives_one() -> None:
         coulomb_force=5.0,
     )
     u = nested(4.0)
-    y = stage.simulate(u, DT).x + 20e-9 * np.random.default_rng(2).standard_normal(u.size)
+    y = stage.simulate(u, DT, initial=stage.equilibrium(u[0])).x + 20e-9 * np.random.default_rng(
+        2
+    ).standard_normal(u.size)
     log = pt.Dataset(u=u, y=y, dt=DT)
     fit = pt.identify(log, "first-order-dahl", history="virgin")
     for name in ("rest_stiffness", "coulomb_force"):
@@ -108,7 +114,7 @@ def test_several_records_determine_values_better() -> None:
     rng = np.random.default_rng(4)
     u = nested(4.0)
     logs = [
-        pt.Dataset(u=u, y=STAGE.simulate(u, DT).x + noise, dt=DT)
+        pt.Dataset(u=u, y=STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x + noise, dt=DT)
         for noise in 30e-9 * rng.standard_normal((4, u.size))
     ]
     options = {"method": METHOD, "drift": False, "history": "virgin"}
@@ -120,7 +126,7 @@ def test_several_records_determine_values_better() -> None:
 
 def test_wrong_levels_and_names_are_refused() -> None:
     u = nested(4.0)
-    log = pt.Dataset(u=u, y=STAGE.simulate(u, DT).x, dt=DT)
+    log = pt.Dataset(u=u, y=STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x, dt=DT)
     certainty = pt.identify(log, "prandtl-ishlinskii", method=METHOD).covariance
     for level in (0.0, 1.0, -1.0, 95.0):
         with pytest.raises(ParameterError) as refused:

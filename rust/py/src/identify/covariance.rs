@@ -24,6 +24,7 @@ type Found = (Vec<Vec<f64>>, Vec<bool>, Vec<f64>, Vec<(f64, f64)>, Vec<Vec<f64>>
 
 /// How sure the values of a fit are, whose records are linearised about it.
 #[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
 fn linearised_covariance(
     py: Python<'_>,
     records: Vec<Record<'_>>,
@@ -57,6 +58,7 @@ fn linearised_covariance(
 
 /// Values of all parameters of a model, with those that are tied from the others.
 #[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
 fn tied_values(
     model: &str,
     mut values: Vec<f64>,

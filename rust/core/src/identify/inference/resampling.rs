@@ -113,7 +113,7 @@ mod tests {
     use crate::signal::index;
 
     #[test]
-    fn white_noise_has_the_errors_of_the_textbook() {
+    fn white_noise_has_the_errors_of_the_textbook() -> crate::Result<()> {
         let n = 2000;
         let t: Vec<f64> = (0..n).map(|k| index(k) / index(n)).collect();
         let noise: Vec<f64> = (0..n).map(|k| Draws::normal(7, k as u64)).collect();
@@ -125,11 +125,12 @@ mod tests {
             noise: noise.iter().map(|x| x - mean).collect(),
             weight: 1.0,
         };
-        let found = covariance(&[record], &[vec![0.0]], 199, 1).unwrap();
+        let found = covariance(&[record], &[vec![0.0]], 199, 1)?;
         // Variance of a slope: s^2 / sum (t - mean)^2 = 12 s^2 / n.
         assert!((found.matrix[0][0] * index(n) / 12.0 - 1.0).abs() < 0.15);
         let mut sizes: Vec<f64> = found.resampled.iter().map(|row| row[0]).collect();
         sizes.sort_by(f64::total_cmp);
         assert!((1.6..2.4).contains(&sizes[189]));
+        Ok(())
     }
 }
