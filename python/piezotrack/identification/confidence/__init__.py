@@ -1,1 +1,1 @@
-"""How sure an identification is: sensitivities and the covariance of what was fitted."""
+"""How sure an identification is, and what to measure next."""

@@ -197,7 +197,7 @@ class Covariance:
             There is no such value, or `level` is no share.
         """
         place = self._place(name)
-        reach = self.widening[place] * _normal(level) * self.deviations[place]
+        reach = float(self.widening[place] * _normal(level) * self.deviations[place])
         value = float(self.values[place])
         return Interval(value - reach, value + reach)
 
