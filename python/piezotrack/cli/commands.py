@@ -32,6 +32,7 @@ from .models.identify import identify_command
 from .models.noise import noise_command
 from .models.simulate import simulate_command
 from .models.step import step_command
+from .models.watch import watch_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -120,6 +121,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "compare": compare_command,
     "benchmark": benchmark_command,
     "campaign": campaign_command,
+    "watch": watch_command,
     "step": step_command,
     "simulate": simulate_command,
     "feedforward": feedforward_command,
