@@ -32,6 +32,7 @@ from .models.identify import identify_command
 from .models.noise import noise_command
 from .models.simulate import simulate_command
 from .models.step import step_command
+from .models.suggest import suggest_command
 from .models.watch import watch_command
 
 if TYPE_CHECKING:
@@ -122,6 +123,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "benchmark": benchmark_command,
     "campaign": campaign_command,
     "watch": watch_command,
+    "suggest": suggest_command,
     "step": step_command,
     "simulate": simulate_command,
     "feedforward": feedforward_command,

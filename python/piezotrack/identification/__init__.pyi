@@ -12,6 +12,9 @@ from .campaigns.result import TaskResult as TaskResult
 from .comparison.compare import Comparison as Comparison
 from .comparison.compare import ModelScore as ModelScore
 from .comparison.compare import compare as compare
+from .confidence.suggested_drive import ExpectedDeviation as ExpectedDeviation
+from .confidence.suggested_drive import SuggestedDrive as SuggestedDrive
+from .confidence.suggested_drive import suggest_drive as suggest_drive
 from .experiments.cross_talk import CrossTalk as CrossTalk
 from .experiments.cross_talk import identify_cross_talk as identify_cross_talk
 from .experiments.sensor_noise import Noise as Noise

@@ -170,7 +170,11 @@ def _estimates(fit: Identification) -> list[str]:
     lines += [*_lists(fit), *_constraints(fit), *_correlated(fit)]
     which = "this record" if len(fit.records) == 1 else "these records"
     if unclear := [n for n, e in fit.parameters.items() if not (e.identified or e.from_prior)]:
-        lines += ["", f"Not determined by {which}: " + ", ".join(unclear) + "."]
+        lines += [
+            "",
+            f"Not determined by {which}: " + ", ".join(unclear) + ".",
+            "What to measure next: piezotrack suggest, in Python pt.suggest_drive.",
+        ]
     if known := [n for n, e in fit.parameters.items() if e.from_prior]:
         lines += ["", f"Known by their priors, not by {which}: " + ", ".join(known) + "."]
     if fit.search and fit.search.nfail:

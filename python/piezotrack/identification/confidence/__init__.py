@@ -1,0 +1,1 @@
+"""Confidence in a model, and the drive that raises it."""

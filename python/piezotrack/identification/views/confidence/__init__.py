@@ -1,0 +1,1 @@
+"""Tables and pictures of how sure a model is."""
