@@ -5,22 +5,25 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ... import _core
-from ...errors import PiezotrackError
+from ...errors import DataError, PiezotrackError
 from ..fitted.covariance import Covariance, NoiseShares
 from ..solve.selection import period_of
 from .sensitivity import DELAY, Value, fitted_values, moved, sensitivity
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
     from ..fitted.estimates import Estimate
     from ..fitted.identification import Identification
+    from ..fitted.identified_model import IdentifiedModel
     from .sensitivity import Sensitivity
 
     Array = NDArray[np.float64]
@@ -50,7 +53,8 @@ def with_covariance(fit: Identification) -> Identification:
         short or nothing was fitted.
     """
     try:
-        covariance = covariance_of(fit)
+        records = [(one.data, one.weight) for one in fit.records if one.data is not None]
+        covariance = covariance_of(fit, records)
     except PiezotrackError:
         covariance = None
     parameters = {
@@ -79,14 +83,8 @@ def _deviation(
         return covariance.deviation(name)
     if estimate.tie is not None and covariance is not None:
         return covariance.reach(_gradient(fit, name), level=0.6826894921370859)
-    # What a search found without effect, or between its own bounds alone, stays as it was.
-    if estimate.free and covariance is not None and name not in (DELAY, *_sensor_names(fit)):
-        return None if estimate.at_bound else estimate.deviation
+    # On a bound, and of what belongs to a record, for independent residuals.
     return estimate.deviation
-
-
-def _sensor_names(fit: Identification) -> tuple[str, ...]:
-    return tuple(fit.records[0].parameters)
 
 
 def _gradient(fit: Identification, name: str) -> Array:
@@ -100,61 +98,70 @@ def _gradient(fit: Identification, name: str) -> Array:
     return np.asarray(np.nan_to_num(np.array(slopes, dtype=np.float64)))
 
 
-def covariance_of(fit: Identification) -> Covariance | None:
-    """Return the covariance of what was fitted; None where nothing was.
+def covariance_of(
+    model: IdentifiedModel,
+    records: Sequence[tuple[Dataset, float]],
+    *,
+    noise: Literal["not repeated", "residual"] = "not repeated",
+) -> Covariance:
+    """Return the covariance of what was fitted to records.
 
     Parameters
     ----------
-    fit : Identification
-        With its records.
+    model : IdentifiedModel
+        With values that were fitted.
+    records : sequence of (Dataset, float)
+        The records with their weights.
+    noise : {"not repeated", "residual"}, optional
+        Whether what repeats with the drive is model error, or all of the residual is noise.
 
     Returns
     -------
-    Covariance or None
+    Covariance
         Of the values of `fitted_values`.
 
     Raises
     ------
     DataError
-        The records have too few samples.
+        The records have too few samples, or no value was fitted.
     """
-    values = fitted_values(fit)
+    values = fitted_values(model)
     if not values:
-        return None
-    sizes = np.array([abs(value.of(fit)) or fit.data.dt for value in values])
-    records = [
-        _Linear(sensitivity(fit, one.data, values), one.data, one.weight, sizes)
-        for one in fit.records
-        if one.data is not None
+        raise DataError("no value was fitted: expected one or more")
+    sizes = np.array([abs(value.of(model)) or records[0][0].dt for value in values])
+    linear = [
+        _Linear(sensitivity(model, data, values), data, weight, sizes, noise)
+        for data, weight in records
     ]
-    precision = np.diag(_precision(fit, values) * sizes**2).tolist()
-    longest = max(record.samples for record in records)
+    precision = np.diag(_precision(model, values) * sizes**2).tolist()
+    longest = max(record.samples for record in linear)
     short = longest <= MOST_RESAMPLED
     found = _core.linearised_covariance(
-        [record.thinned(MOST) for record in records], precision, DRAWS if short else 0, SEED
+        [record.thinned(MOST) for record in linear], precision, DRAWS if short else 0, SEED
     )
     resampled = found[4]
     if not short:
-        few = [record.thinned(MOST_RESAMPLED) for record in records]
+        few = [record.thinned(MOST_RESAMPLED) for record in linear]
         resampled = _core.linearised_covariance(few, precision, DRAWS, SEED)[4]
     quantiles = np.quantile(np.array(resampled), LEVEL, axis=0)
     return Covariance(
         names=tuple(str(value) for value in values),
-        values=np.array([value.of(fit) for value in values]),
+        values=np.array([value.of(model) for value in values]),
         matrix=np.array(found[0]) * np.outer(sizes, sizes),
         determined=np.array(found[1]),
         independent=np.sqrt(np.array(found[2])) * sizes,
         widening=np.maximum(quantiles / NormalDist().inv_cdf(0.5 + 0.5 * LEVEL), 1.0),
         shifts=np.array(found[3]) * sizes[:, None],
-        samples=sum(record.samples for record in records),
+        samples=sum(record.samples for record in linear),
         orders=tuple(found[5]),
-        shares=records[0].shares,
+        shares=linear[0].shares,
     )
 
 
-def _precision(fit: Identification, values: list[Value]) -> Array:
+def _precision(model: IdentifiedModel, values: list[Value]) -> Array:
     """Inverse squares of the widths of the priors, SI; 0 without one."""
-    priors = [fit.parameters[str(v)].prior if str(v) in fit.parameters else None for v in values]
+    entries = model.details.get("parameters", {})
+    priors = [entries.get(value.parameter, {}).get("prior") for value in values]
     return np.array(
         [0.0 if prior is None else prior[1] ** -2 for prior in priors], dtype=np.float64
     )
@@ -163,10 +170,19 @@ def _precision(fit: Identification, values: list[Value]) -> Array:
 class _Linear:
     """A record that is linearised, its values in shares of their size."""
 
-    def __init__(self, linear: Sensitivity, data: Dataset, weight: float, sizes: Array) -> None:
+    def __init__(
+        self,
+        linear: Sensitivity,
+        data: Dataset,
+        weight: float,
+        sizes: Array,
+        noise: Literal["not repeated", "residual"],
+    ) -> None:
         self.columns, self.nuisance = linear.columns * sizes[:, None], linear.nuisance
         self.residual, self.weight = linear.residual, weight
         self.noise, self.shares = _without_repeated(linear.residual, data)
+        if noise == "residual":
+            self.noise = linear.residual
 
     @property
     def samples(self) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import PiezotrackError
+from ..fitted.identified_model import IdentifiedModel
 from ..fitted.start import same_beginning, start_after, start_at_jump
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
     from ...data.dataset import Dataset
     from ...stages.motion import StageState
-    from ..fitted.identified_model import IdentifiedModel
     from ..fitted.start import Start
 
     Array = NDArray[np.float64]
@@ -162,13 +162,9 @@ def _tied(model: IdentifiedModel, changed: Mapping[str, Any]) -> dict[str, float
 
 def _without_search(model: IdentifiedModel) -> IdentifiedModel:
     """Return an identified model without the search that found it."""
-    kept = {name.name: getattr(model, name.name) for name in fields(_base(model))}
-    return _base(model)(**kept)
-
-
-def _base(model: IdentifiedModel) -> type[IdentifiedModel]:
-    """Class of the models that are read from files."""
-    return next(one for one in type(model).__mro__ if one.__name__ == "IdentifiedModel")
+    return IdentifiedModel(
+        **{field.name: getattr(model, field.name) for field in fields(IdentifiedModel)}
+    )
 
 
 def sensitivity(model: IdentifiedModel, data: Dataset, values: list[Value]) -> Sensitivity:
