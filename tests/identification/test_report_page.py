@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import datetime
 import hashlib
+import html
 import re
 import xml.etree.ElementTree as ET
 from functools import cache
@@ -95,7 +96,9 @@ def test_the_page_is_whole_and_loads_nothing(fit: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize("ending", ["html", "pdf"])
 def test_the_same_fit_gives_the_same_bytes(ending: str, tmp_path: Path) -> None:
     first = written(dahl(), tmp_path / f"a.{ending}")
-    assert written(dahl(), tmp_path / f"b.{ending}") == first
+    # The solver of the layout depends on addresses in memory.
+    for _ in range(2):
+        assert written(dahl(), tmp_path / f"b.{ending}") == first
     other = dahl().report(tmp_path / f"c.{ending}", date=datetime.date(2021, 1, 1)).read_bytes()
     assert other != first
 
@@ -149,12 +152,14 @@ def test_the_interval_holds_the_value_and_grows_with_the_deviation() -> None:
     assert rows["K"][3] == ""
 
 
-def test_a_controller_is_shown_with_its_margins(tmp_path: Path) -> None:
+def test_controller_and_suggestion_are_shown(tmp_path: Path) -> None:
     tuned = pt.tune(
         pt.VirtualStage.of(plays().zeroed()), dt=0.005, limits=(0.0, 3.6),
         search=pt.TuningSearch(seed=1),
     )  # fmt: skip
-    text = written(plays(), tmp_path / "report.html", controller=tuned).decode()
+    drive = pt.suggest_drive(plays(), limits=(0.0, 3.6), slew=50.0, seconds=2.0, dt=0.01)
+    text = written(plays(), tmp_path / "report.html", controller=tuned, suggestion=drive).decode()
+    assert text.index(html.escape(drive.summary().splitlines()[0])) < text.index("gain margin")
     assert f"gain margin {tuned.kept[0].value:.3g}" in text
     assert text.index("gain margin") < text.index("sha256")
 
@@ -168,7 +173,7 @@ def test_another_ending_is_refused(name: str, tmp_path: Path) -> None:
 
 
 def test_other_bad_arguments_are_refused(tmp_path: Path) -> None:
-    for argument in ({"controller": 3}, {"date": "2020-02-29"}):
+    for argument in ({"controller": 3}, {"suggestion": plays}, {"date": "2020-02-29"}):
         with pytest.raises(ParameterError, match=next(iter(argument))):
             plays().report(tmp_path / "report.html", **argument)  # type: ignore[arg-type]
     with pytest.raises(DataError, match="cannot be written"):

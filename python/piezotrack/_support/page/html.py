@@ -8,6 +8,7 @@ from html import escape
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
+from .layout import lay_out
 from .parts import Listing, Picture, Sentences
 
 if TYPE_CHECKING:
@@ -94,5 +95,6 @@ def _picture(picture: Picture) -> str:
     with mpl.rc_context({"font.size": TYPE}):
         figure = Figure(figsize=(WIDTH, picture.height), layout="constrained")
         picture.draw(figure)
+        lay_out(figure)
         text = svg_text(figure, picture.name)
     return "data:image/svg+xml;base64," + b64encode(text.encode()).decode()

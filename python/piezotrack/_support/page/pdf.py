@@ -8,6 +8,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from .html import TYPE, WIDTH
+from .layout import lay_out
 from .parts import Listing, Picture, Sentences
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def _drawn(strips: list[Strip], number: str) -> Figure:
     """Draw a sheet: pictures in the rows of a grid, words at their places."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=SHEET, layout="constrained")
+    figure = Figure(figsize=SHEET, dpi=72, layout="constrained")
     heights = [TOP, *(one.height for one in strips)]
     heights.append(SHEET[1] - math.fsum(heights))
     grid = figure.add_gridspec(
@@ -99,6 +100,8 @@ def _drawn(strips: list[Strip], number: str) -> Figure:
         if strip.write is not None:
             strip.write(figure, top)
         top -= strip.height
+    if any(one.picture for one in strips):
+        lay_out(figure)
     _write(figure, SHEET[0] - LEFT, 0.5, number, size=SMALL, color=DARK, ha="right")
     return figure
 

@@ -1,1 +1,1 @@
-"""How sure a model is, and what a further record would tell."""
+"""Confidence in a model, and the drive that raises it."""

@@ -1,4 +1,4 @@
-"""What to measure next: the drive whose record determines the parameters best."""
+"""Choice of the drive to measure next, whose record determines the parameters best."""
 
 from __future__ import annotations
 

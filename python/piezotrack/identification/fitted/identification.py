@@ -316,6 +316,7 @@ class Identification(IdentifiedModel):
         path: str | os.PathLike[str],
         *,
         controller: Result | None = None,
+        suggestion: Result | None = None,
         date: datetime.date | None = None,
     ) -> Path:
         """Write a report of the stage for readers who do not know the package.
@@ -331,6 +332,8 @@ class Identification(IdentifiedModel):
             complete.
         controller : Result, optional
             A controller for the stage and its margins, as `piezotrack.tune` returns it.
+        suggestion : Result, optional
+            What to measure next, as `piezotrack.suggest_drive` returns it.
         date : datetime.date, optional
             Date below the title; today where not given. All else depends on the fit alone.
 
@@ -355,7 +358,9 @@ class Identification(IdentifiedModel):
         >>> fit.report(os.path.join(tempfile.mkdtemp(), "report.html")).name
         'report.html'
         """
-        written: Path = self.view("report")(self, path, controller=controller, date=date)
+        written: Path = self.view("report")(
+            self, path, controller=controller, suggestion=suggestion, date=date
+        )
         return written
 
 

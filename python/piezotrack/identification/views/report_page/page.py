@@ -26,6 +26,7 @@ def write_report(
     path: str | os.PathLike[str],
     *,
     controller: Result | None = None,
+    suggestion: Result | None = None,
     date: datetime.date | None = None,
     command: str | None = None,
 ) -> Path:
@@ -37,19 +38,25 @@ def write_report(
         The command that made the fit.
     """
     page_file("path", path)
-    return write_page(report_page(fit, controller=controller, date=date, command=command), path)
+    page = report_page(
+        fit, controller=controller, suggestion=suggestion, date=date, command=command
+    )
+    return write_page(page, path)
 
 
 def report_page(
     fit: Identification,
     *,
     controller: Result | None = None,
+    suggestion: Result | None = None,
     date: datetime.date | None = None,
     command: str | None = None,
 ) -> Page:
     """Make the content of the report; arguments as of `write_report`."""
     if controller is not None:
         expect("controller", controller, Result, "a result, as of pt.tune")
+    if suggestion is not None:
+        expect("suggestion", suggestion, Result, "a result, as of pt.suggest_drive")
     if date is not None:
         expect("date", date, datetime.date, "a datetime.date")
     day = datetime.date.today() if date is None else date
@@ -60,6 +67,7 @@ def report_page(
         sections.parameters(fit),
         sections.verdicts(fit),
         sections.search(fit),
+        sections.suggestion(suggestion),
         sections.controller(controller),
         again_section(fit, command),
     ]

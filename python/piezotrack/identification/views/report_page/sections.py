@@ -29,7 +29,16 @@ if TYPE_CHECKING:
     from ...fitted.fitted_record import FittedRecord
     from ...fitted.identification import Identification
 
-__all__ = ["controller", "motion", "overview", "parameters", "records", "search", "verdicts"]
+__all__ = [
+    "controller",
+    "motion",
+    "overview",
+    "parameters",
+    "records",
+    "search",
+    "suggestion",
+    "verdicts",
+]
 
 # Confidence of the intervals, and the records that are drawn at most.
 LEVEL = 0.95
@@ -212,6 +221,18 @@ def search(fit: Identification) -> Section:
 
 def _chosen(fit: Identification, title: str) -> str:
     return "chosen" if title == fit.model.info.title else ""
+
+
+def suggestion(result: Result | None) -> Section | None:
+    """Write and draw a suggested drive."""
+    if result is None:
+        return None
+
+    def draw(figure: Figure | SubFigure) -> None:
+        result.plot(fig=figure)
+
+    picture = Picture("suggestion", draw, 4.4, "the drive that is suggested")
+    return Section("What to measure next", (Listing(result.summary()), picture))
 
 
 def controller(result: Result | None) -> Section | None:
