@@ -28,11 +28,12 @@ if TYPE_CHECKING:
 
 DAY = datetime.date(2020, 2, 29)
 LOG = pt.datasets.dbo_training()
+FEW = pt.LeastSquares(count=4, creep=False, dynamics=None)
 
 
 @cache
 def plays() -> pt.identification.Identification:
-    return pt.identify(LOG[3.0:8.0], "prandtl-ishlinskii", progress=False)
+    return pt.identify(LOG[3.0:8.0], "prandtl-ishlinskii", method=FEW, progress=False)
 
 
 @cache
@@ -48,7 +49,7 @@ def dahl() -> pt.identification.Identification:
 @cache
 def several() -> pt.identification.Identification:
     records = [pt.Record(LOG[3.0:6.0], weight=2.0), pt.Record(LOG[6.0:9.0], offset=False)]
-    return pt.identify(records, "prandtl-ishlinskii", progress=False)
+    return pt.identify(records, "prandtl-ishlinskii", method=FEW, progress=False)
 
 
 class Elements(HTMLParser):
@@ -157,7 +158,7 @@ def test_controller_and_suggestion_are_shown(tmp_path: Path) -> None:
         pt.VirtualStage.of(plays().zeroed()), dt=0.005, limits=(0.0, 3.6),
         search=pt.TuningSearch(seed=1),
     )  # fmt: skip
-    drive = pt.suggest_drive(plays(), limits=(0.0, 3.6), slew=50.0, seconds=2.0, dt=0.01)
+    drive = pt.suggest_drive(plays(), limits=(0.0, 3.6), slew=50.0, seconds=1.0, dt=0.01)
     text = written(plays(), tmp_path / "report.html", controller=tuned, suggestion=drive).decode()
     assert text.index(html.escape(drive.summary().splitlines()[0])) < text.index("gain margin")
     assert f"gain margin {tuned.kept[0].value:.3g}" in text
@@ -197,7 +198,7 @@ def test_names_of_files_are_shown_as_they_are(tmp_path: Path) -> None:
     t = np.arange(1000) / 200.0
     u = 30.0 - 30.0 * np.cos(2.0 * np.pi * t)
     log = pt.Dataset(u=u, y=1e-6 * u, dt=0.005, source="<b>$x_$ & \x07.csv")
-    fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+    fit = pt.identify(log, "prandtl-ishlinskii", method=FEW, progress=False)
     text = written(fit, tmp_path / "report.html").decode()
     assert "&lt;b&gt;$x_$ &amp; " in text
     assert "<b>" not in text
@@ -206,7 +207,7 @@ def test_names_of_files_are_shown_as_they_are(tmp_path: Path) -> None:
 
 def test_no_more_than_four_records_are_drawn() -> None:
     logs = [LOG[3.0 + i : 4.0 + i] for i in range(6)]
-    fit = pt.identify(logs, "prandtl-ishlinskii", progress=False)
+    fit = pt.identify(logs, "prandtl-ishlinskii", method=FEW, progress=False)
     drawn = [
         part.name
         for section in report_page(fit, date=DAY).sections

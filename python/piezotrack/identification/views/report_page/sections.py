@@ -231,8 +231,13 @@ def suggestion(result: Result | None) -> Section | None:
     def draw(figure: Figure | SubFigure) -> None:
         result.plot(fig=figure)
 
-    picture = Picture("suggestion", draw, 4.4, "the drive that is suggested")
-    return Section("What to measure next", (Listing(result.summary()), picture))
+    # Its picture has a row for each parameter, so that the table of its text is left out.
+    height = max(3.6, 1.0 + 0.13 * len(getattr(result, "parameters", ())))
+    picture = Picture(
+        "suggestion", draw, min(height, 9.0), "suggested drive, and the deviations to expect"
+    )
+    drive = result.summary().partition("\n\n")[0]
+    return Section("What to measure next", (Listing(drive), picture))
 
 
 def controller(result: Result | None) -> Section | None:
