@@ -45,3 +45,7 @@ from .problem.objective import Objective as Objective
 from .problem.parameter import Parameter as Parameter
 from .problem.records import Record as Record
 from .solve.posterior_models import posterior_models as posterior_models
+from .watching.health import Change as Change
+from .watching.health import Health as Health
+from .watching.health import Refit as Refit
+from .watching.watch import watch as watch
