@@ -34,8 +34,6 @@ __all__ = [
     "verdict_sentences",
 ]
 
-# Correlation of neighbouring residuals from which on standard deviations are too small.
-CORRELATED = 0.3
 # Whether a constraint decides the result.
 STATES = {True: "active: the two are equal", False: "not active"}
 # Units of values that a stage gives in um, and the factor for a drive in metres.
@@ -59,7 +57,14 @@ def summary_text(fit: Identification) -> str:
     lines += [f"      {one}" for one in search_sentences(fit)]
     lines += _trials(fit)
     lines += [*(f"note  {note}" for note in fit.notes), ""]
-    return "\n".join([*lines, *(_estimates(fit) if fit.model.info.searched else _values(fit))])
+    return "\n".join([*lines, *_parameters(fit)])
+
+
+def _parameters(fit: Identification) -> list[str]:
+    """List the parameters, and what is known of them."""
+    if fit.model.info.searched:
+        return _estimates(fit)
+    return [*_values(fit), *_certainty(fit)]
 
 
 def search_sentences(fit: Identification) -> list[str]:
@@ -184,7 +189,7 @@ def _estimates(fit: Identification) -> list[str]:
     width = 1 + max(3, *(len(estimate.symbol) for estimate in fit.parameters.values()))
     lines.append(f"  {'':<18}{'':<{width}}{'value':>13}  {'':<9}{'standard deviation'}")
     lines += [_row(fit, name, estimate, width) for name, estimate in fit.parameters.items()]
-    lines += [*(f"  {one}" for one in list_sentences(fit)), *_constraints(fit), *_correlated(fit)]
+    lines += [*(f"  {one}" for one in list_sentences(fit)), *_constraints(fit), *_certainty(fit)]
     lines += [line for sentence in _undetermined(fit) for line in ("", sentence)]
     return lines
 
@@ -235,9 +240,7 @@ def verdict_sentences(fit: Identification) -> list[str]:
     if fit.scale_assumed:
         lines.append("Parameters: " + " ".join(_assumed(fit)))
     lines += [f"Constraint {one.text}: {STATES[one.active]}." for one in fit.constraints]
-    if correlated := " ".join(_correlated(fit)):
-        lines.append(correlated.strip())
-    return [*lines, *_undetermined(fit)]
+    return [*lines, *(one for one in _certainty(fit) if one), *_undetermined(fit)]
 
 
 def _values(fit: IdentifiedModel) -> list[str]:
@@ -264,23 +267,21 @@ def list_sentences(fit: IdentifiedModel) -> list[str]:
     ]
 
 
-def _correlated(fit: Identification) -> list[str]:
-    """Say that the standard deviations are too small, where residuals are correlated.
-
-    Of residuals x_i = r x_(i-1) + white noise, and a parameter that shows slowly, they are so by
-    sqrt((1 + r) / (1 - r)) (Bartlett 1935, doi 10.2307/2342284).
-    """
-    stated = [one.deviation for one in fit.parameters.values() if one.free and one.deviation]
-    known = [one for one in fit.autocorrelations if one > CORRELATED]
-    if not known or not any(map(math.isfinite, stated)):
+def _certainty(fit: Identification) -> list[str]:
+    """Say what of the residual no interval covers, and which values the model decides."""
+    covariance = fit.covariance
+    if covariance is None:
         return []
-    r = min(max(known), 1.0 - 1e-9)
-    factor = math.sqrt((1.0 + r) / (1.0 - r))
-    return [
-        "",
-        f"Neighbouring residuals correlate by {r:.2g}: the standard deviations are lower bounds,",
-        f"up to about {factor:.2g} times too small.",
-    ]
+    lines: list[str] = []
+    if (shares := covariance.shares) is not None:
+        lines.append(
+            f"{length_text(shares.model_error, 3)} of the residual repeat in every period, which "
+            f"no interval covers; noise {length_text(shares.noise, 3)}."
+        )
+    decided = [name for name in covariance.decided_by_model if name in fit.parameters]
+    if decided:
+        lines.append(f"The error of the model, not the noise, decides: {', '.join(decided)}.")
+    return ["", *lines] if lines else []
 
 
 def _runs(search: SearchRun, method: Descents | ParticleSwarm) -> list[str]:
