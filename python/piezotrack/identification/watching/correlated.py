@@ -1,4 +1,4 @@
-"""Errors of least squares whose residuals are correlated, by an autoregression of them."""
+"""Independent samples that a correlated residual is worth, by an autoregression of it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HIGHEST, FLOOR = 24, 1e-12
 
 
 class Autoregression:
-    r"""An autoregression of a residual, and what its spectrum makes of errors.
+    r"""An autoregression of a residual, for the spread of its rms and of its mean.
 
     .. math:: e_i = \sum_{k=1}^p a_k e_{i-k} + \epsilon_i, \qquad
         S(\omega) = \sigma^2 / |1 - \sum_k a_k e^{-i k \omega}|^2
@@ -101,34 +101,3 @@ class Autoregression:
             In the unit of the residual.
         """
         return float(np.sqrt(self._spectrum(2)[0] / self.count))
-
-    def covariance(self, columns: Array) -> Array:
-        r"""Covariance of coefficients of least squares with this residual.
-
-        .. math:: (C^T C)^{-1} C^T \Gamma C (C^T C)^{-1}
-
-        with the covariance :math:`\Gamma` of the residual (White 1980, doi 10.2307/1912934; for
-        correlated residuals Hansen 1982, doi 10.2307/1912775).
-
-        Parameters
-        ----------
-        columns : ndarray, shape (n, p)
-            Derivatives of what was fitted.
-
-        Returns
-        -------
-        ndarray, shape (p, p)
-            The covariance.
-        """
-        size = next_fast_len(2 * columns.shape[0])
-        transformed = np.fft.rfft(columns, size, axis=0)
-        weights = self._spectrum(size)
-        twice = np.full(weights.size, 2.0)
-        twice[0] = 1.0
-        if size % 2 == 0:
-            twice[-1] = 1.0
-        weighted = transformed * (twice * weights / size)[:, None]
-        middle = np.real(transformed.conj().T @ weighted)
-        bread = np.linalg.pinv(columns.T @ columns)
-        covariance: Array = bread @ middle @ bread
-        return covariance

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import stdtrit
 
+from ... import _core
 from ..._support.statistics import sample_noise
 from ..fitted.start import begin, same_beginning, start_after, start_at_jump
 from .correlated import Autoregression
@@ -140,7 +141,7 @@ class Judgement:
     ) -> dict[str, float]:
         """Half widths of the intervals, for noise, for the model's own record and its error."""
         process = Autoregression(left, whole.shape[1])
-        spread = np.sqrt(np.maximum(np.diag(process.covariance(whole))[1:], 0.0))
+        spread = _deviations(columns, left)
         own = math.sqrt(1.0 + self._own_share(float(np.sqrt(np.mean(left**2)))))
         quantile = self.quantile(process.effective - whole.shape[1])
         widths = {}
@@ -291,6 +292,15 @@ class Judgement:
         interval = ratio * math.exp(-width), ratio * math.exp(width)
         verdict: Verdict = "unchanged" if interval[0] <= 1.0 <= interval[1] else "changed"
         return Change("noise", ratio, interval, "", verdict)
+
+
+def _deviations(columns: Array, left: Array) -> Array:
+    """Return standard deviations beside an offset; infinite where nothing shows a coefficient."""
+    count = columns.shape[1]
+    record = (list(columns.T), [np.ones(left.size)], left, left, 1.0)
+    found = _core.linearised_covariance([record], np.zeros((count, count)).tolist(), 0, 0)
+    deviations = np.sqrt(np.maximum(np.diag(np.array(found[0])), 0.0))
+    return np.where(found[1], deviations, np.inf)
 
 
 def _still(model: IdentifiedModel, data: Dataset) -> Array:

@@ -27,11 +27,12 @@ def watch(model: IdentifiedModel, record: Dataset, *, refit: bool = False) -> He
 
     Changes of gain, hysteresis, mode, lag, delay and drift are fitted to the residual of the
     record, by Gauss-Newton steps of the model. Their standard deviations are those of least squares
-    with a correlated residual (`Autoregression.covariance`), enlarged by that of the record
-    identified, whose duration counts. The model itself is inexact: of its own residual what is not
-    noise, :math:`\sqrt{e^2 - \sigma^2}`, may be a change wholly, so each interval is wider by that
-    over the rms of what the change moves and nothing else does. The intervals hold at once, by
-    Bonferroni's inequality.
+    with a correlated residual, by its autoregression (Domowitz and White 1982, doi
+    10.1016/0304-4076(82)90012-3), enlarged by that of the record identified, whose duration counts.
+    The model itself is inexact: of its own residual what is not noise,
+    :math:`\sqrt{e^2 - \sigma^2}`, may be a change wholly, so each interval is wider by that over
+    the rms of what the change moves and nothing else does. The intervals hold at once, by Bonferroni's
+    inequality.
 
     The gain is that of all of the motion, and the delay all that it comes later: of mode and lag
     what is not one of the two.
