@@ -149,7 +149,7 @@ def test_arguments_are_kept_in_the_model_file(tmp_path: Path) -> None:
     assert "arguments" not in plays().details["provenance"]
 
 
-def test_the_interval_holds_the_value_and_grows_with_the_deviation() -> None:
+def test_the_interval_is_that_of_the_covariance() -> None:
     (table,) = (
         part
         for section in report_page(dahl(), date=DAY).sections
@@ -157,10 +157,8 @@ def test_the_interval_holds_the_value_and_grows_with_the_deviation() -> None:
         if section.title == "Parameters"
     )
     rows = {row[1]: row for row in table.rows}  # type: ignore[union-attr]
-    damping = dahl().parameters["damping"]
-    low, high = map(float, str(rows["D"][3]).split(" to "))
-    assert damping.deviation is not None
-    assert (high - low) / damping.deviation == pytest.approx(2.0 * 1.959964, rel=2e-2)
+    interval = tuple(map(float, str(rows["D"][3]).split(" to ")))
+    assert interval == pytest.approx(dahl().covariance.interval("damping"), rel=1e-3)
     assert rows["K"][3] == ""
 
 

@@ -275,7 +275,7 @@ def _certainty(fit: Identification) -> list[str]:
     lines: list[str] = []
     if (shares := covariance.shares) is not None:
         lines.append(
-            f"{length_text(shares.model_error, 3)} of the residual repeat in every period, which "
+            f"{length_text(shares.model_error, 3)} of the residual repeats in every period, which "
             f"no interval covers; noise {length_text(shares.noise, 3)}."
         )
     decided = [name for name in covariance.decided_by_model if name in fit.parameters]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import partial
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from ...._support.display.table import words
@@ -156,7 +155,7 @@ def _estimates(fit: Identification) -> Table:
             name.replace("_", " "),
             one.symbol,
             f"{one.value:.6g}",
-            _interval(one),
+            _interval(fit, name),
             one.unit,
             _remark(one) + parameter_notes(fit, name),
         )
@@ -166,13 +165,13 @@ def _estimates(fit: Identification) -> Table:
     return words("", [(*row[:-1], row[-1].removeprefix(", ")) for row in rows], heads)
 
 
-def _interval(estimate: Estimate) -> str:
-    """Write the interval of a value by its standard deviation, for normal errors."""
-    deviation = estimate.deviation
-    if not deviation or not math.isfinite(deviation):
+def _interval(fit: Identification, name: str, scale: float = 1.0) -> str:
+    """Write the interval of a value."""
+    covariance = fit.covariance
+    if covariance is None or name not in covariance.names:
         return ""
-    half = NormalDist().inv_cdf(0.5 + LEVEL / 2.0) * deviation
-    return f"{estimate.value - half:.4g} to {estimate.value + half:.4g}"
+    lower, upper = covariance.interval(name, LEVEL)
+    return f"{scale * lower:.4g} to {scale * upper:.4g}" if math.isfinite(upper) else ""
 
 
 def _remark(estimate: Estimate) -> str:
@@ -190,8 +189,11 @@ def _values(fit: Identification) -> Table:
         value = getattr(fit.model, one.name)
         if value is not None and not one.is_list:
             unit, scale = shown_unit(of_drive(one.unit, fit.drive_unit))
-            rows.append((one.name.replace("_", " "), one.symbol, f"{scale * value:.6g}", unit))
-    return words("", rows, ("parameter", "symbol", "value", "unit"))
+            interval = _interval(fit, one.name, scale)
+            name = one.name.replace("_", " ")
+            rows.append((name, one.symbol, f"{scale * value:.6g}", interval, unit))
+    heads = ("parameter", "symbol", "value", f"{100 * LEVEL:g} % interval", "unit")
+    return words("", rows, heads)
 
 
 def verdicts(fit: Identification) -> Section | None:
