@@ -54,6 +54,7 @@ from .identification.methods.least_squares import LeastSquares as LeastSquares
 from .identification.methods.particle_swarm import ParticleSwarm as ParticleSwarm
 from .identification.problem.parameter import Parameter as Parameter
 from .identification.problem.records import Record as Record
+from .identification.watching.watch import watch as watch
 from .references.parse import parse_reference as parse_reference
 from .references.paths import circle as circle
 from .references.paths import lissajous as lissajous

@@ -484,6 +484,30 @@ def path_errors(
     x: ArrayLike, y: ArrayLike, path_x: ArrayLike, path_y: ArrayLike
 ) -> NDArray[np.float64]: ...
 def spread(errors: ArrayLike) -> _Spread: ...
+def linearised_covariance(
+    records: Sequence[
+        tuple[
+            Sequence[ArrayLike],
+            Sequence[ArrayLike],
+            ArrayLike,
+            ArrayLike,
+            float,
+        ]
+    ],
+    precision: Sequence[Sequence[float]],
+    draws: int,
+    seed: int,
+) -> tuple[
+    list[list[float]],
+    list[bool],
+    list[float],
+    list[tuple[float, float]],
+    list[list[float]],
+    list[int],
+]: ...
+def tied_values(
+    model: str, values: Sequence[float], ties: Sequence[tuple[int, str]]
+) -> list[float]: ...
 def cross_talk_share(driven: ArrayLike, other: ArrayLike) -> tuple[float, float, float]: ...
 def sensor_noise(
     record: ArrayLike, dt: float

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -58,6 +60,27 @@ def test_identify_writes_what_python_finds() -> None:
     assert printed.startswith(as_printed(fit.summary()))
     for name in RESULTS:
         assert f"  {Path('results', name)}\n" in printed
+
+
+def test_identify_writes_a_report_that_has_the_command() -> None:
+    plays = ("identify", "log.csv", "--model", "prandtl-ishlinskii", "--report", "a report.html")
+    printed = ran(*plays, "--no-offset")
+    assert "  a report.html\n" in printed
+    page = Path("a report.html").read_text(encoding="utf-8")
+    command = html.unescape(page.split("<pre>")[1].split("</pre>")[0])
+    assert sorted(shlex.split(command)[1:]) == sorted([*plays, "--no-offset"])
+    # All is refused before the computation, and nothing is lost.
+    before = sorted(Path().rglob("*"))
+    for options, reason in (
+        ((), "a report.html exists"),
+        (("--report", "r.doc"), ".html or .pdf"),
+        (("--report", "none/r.pdf"), "a folder that exists"),
+        (("--model", "dahl", "--report", "r.pdf"), "several models"),
+    ):
+        assert reason in refusal(*plays, *options, "--out", "other")
+    assert sorted(Path().rglob("*")) == before
+    ran(*plays, "--overwrite")
+    assert "--no-offset" not in Path("a report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.usefixtures("_no_pictures")

@@ -136,6 +136,7 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
         (*COLUMNS, "--displacement", "--hold", "--train", "--test", "--model"),
     ),
     "step": (["log.csv"], (*COLUMNS, "--stiffness", "--mass", "--second-level", "--window")),
+    "watch": (["model.json", "log.csv"], (*COLUMNS, "--displacement", "--hold", "--window")),
     "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
     "info": (["log.csv"], (*COLUMNS, "--displacement")),
     "measure": (

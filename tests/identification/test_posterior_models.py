@@ -59,10 +59,11 @@ def test_a_model_that_is_not_exact_spreads_further_than_its_noise_says() -> None
     # Plays are no Dahl hysteresis: the deviations are correlated.
     log = record(1)
     fit = fitted(log)
-    estimate = fit.parameters["piezo_coefficient"]
-    assert estimate.deviation is not None
+    certainty = fit.covariance
+    independent = certainty.independent[certainty.names.index("piezo_coefficient")]
     found = spread(posterior_models(fit, log, deviations=1.0), "piezo_coefficient")
-    assert found > 2.0 * estimate.deviation
+    assert found > 2.0 * independent
+    assert found == pytest.approx(certainty.deviation("piezo_coefficient"), rel=5e-2)
 
 
 def test_margins_of_a_tuned_loop_hold_for_all_of_them() -> None:

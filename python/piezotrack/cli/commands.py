@@ -33,6 +33,7 @@ from .models.noise import noise_command
 from .models.simulate import simulate_command
 from .models.step import step_command
 from .models.suggest import suggest_command
+from .models.watch import watch_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -121,6 +122,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "compare": compare_command,
     "benchmark": benchmark_command,
     "campaign": campaign_command,
+    "watch": watch_command,
     "suggest": suggest_command,
     "step": step_command,
     "simulate": simulate_command,

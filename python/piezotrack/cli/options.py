@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from contextlib import contextmanager
 from pathlib import Path
 from string import ascii_letters
@@ -44,6 +45,7 @@ __all__ = [
     "can_be_folder",
     "can_be_written",
     "column",
+    "command_line",
     "list_files",
     "number",
     "number_range",
@@ -144,6 +146,25 @@ ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file in 
 def column(text: str | None) -> str | int | None:
     """Parse a column: a number is an index, anything else a name."""
     return int(text) if text is not None and text.isdecimal() else text
+
+
+def command_line(context: typer.Context) -> str:
+    """Write the command with the arguments and options that were given, for a shell."""
+    words = [context.command_path]
+    for parameter in context.command.params:
+        source = context.get_parameter_source(parameter.name or "")
+        if source is None or source.name != "COMMANDLINE":
+            continue
+        value = context.params[parameter.name or ""]
+        values = value if isinstance(value, (list, tuple)) else [value]
+        for one in values:
+            if parameter.param_type_name == "argument":
+                words.append(shlex.quote(str(one)))
+            elif isinstance(one, bool):
+                words.append((parameter.opts if one else parameter.secondary_opts)[0])
+            else:
+                words += [parameter.opts[0], shlex.quote(str(one))]
+    return " ".join(words)
 
 
 def refuse_without_effect(context: typer.Context, options: Iterable[str], reason: str) -> None:

@@ -12,6 +12,7 @@ from .campaigns.result import TaskResult as TaskResult
 from .comparison.compare import Comparison as Comparison
 from .comparison.compare import ModelScore as ModelScore
 from .comparison.compare import compare as compare
+from .confidence.posterior_models import posterior_models as posterior_models
 from .confidence.residual import Ingredient as Ingredient
 from .confidence.residual import Residual as Residual
 from .confidence.residual import ResidualProfile as ResidualProfile
@@ -48,4 +49,7 @@ from .methods.particle_swarm import ParticleSwarm as ParticleSwarm
 from .problem.objective import Objective as Objective
 from .problem.parameter import Parameter as Parameter
 from .problem.records import Record as Record
-from .solve.posterior_models import posterior_models as posterior_models
+from .watching.health import Change as Change
+from .watching.health import Health as Health
+from .watching.health import Refit as Refit
+from .watching.watch import watch as watch

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from .._support.messages import quoted
 from ..errors import ParameterError
+from .confidence.estimate import with_covariance
 from .methods.choice import MethodChoice
 from .problem.checkpoint import checkpoint_of
 from .problem.problem import AUTO, Problem
@@ -214,4 +215,4 @@ def identify(
                 )
     run = Run(threads=0 if threads is None else threads, progress=progress, callback=callback)
     with checkpoint_of(checkpoint, problem, methods) as kept:
-        return solve(problem, methods, replace(run, checkpoint=kept))
+        return with_covariance(solve(problem, methods, replace(run, checkpoint=kept)))

@@ -19,6 +19,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     stages::stage::register(module)?;
     stages::inverse::register(module)?;
     identify::identification::register(module)?;
+    identify::covariance::register(module)?;
     identify::descents::register(module)?;
     identify::objective::register(module)?;
     identify::step::register(module)?;

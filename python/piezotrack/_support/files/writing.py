@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "document_text",
     "json_ready",
     "make_folder",
     "picture_files",
@@ -121,12 +122,17 @@ def write_columns(path: str | os.PathLike[str], columns: Mapping[str, np.ndarray
 
 def write_document(path: str | os.PathLike[str], document: Mapping[str, Any]) -> Path:
     """Write a JSON file, whole or not at all; arguments and errors as of `save`."""
+    text = document_text(document)
+    with replacing(path, synced=True) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return Path(path)
+
+
+def document_text(document: Mapping[str, Any]) -> str:
+    """Write the content of a JSON file."""
     import json
 
-    text = json.dumps(json_ready(document), indent=2, allow_nan=False)
-    with replacing(path, synced=True) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8")
-    return Path(path)
+    return json.dumps(json_ready(document), indent=2, allow_nan=False) + "\n"
 
 
 def make_folder(folder: str | os.PathLike[str]) -> Path:

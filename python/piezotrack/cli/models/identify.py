@@ -14,7 +14,7 @@ from ...errors import Interrupted, ParameterError
 from ..error_messages import report_errors
 from ..interruption import acknowledge_interrupt
 from ..option_groups import HeldLogOptions, with_groups
-from ..options import Json, Out, Overwrite, Quiet, Seconds, of_file, windowed
+from ..options import Json, Out, Overwrite, Quiet, Seconds, command_line, of_file, windowed
 from ..output import Output
 from .fit_options import (
     AUTO,
@@ -81,6 +81,10 @@ def identify_command(
             metavar="FILE", help="Keep simulations here, to go on after an interruption; none."
         ),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Report for other readers, .html or .pdf; default none."),
+    ] = None,
     validate: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Second log, for validation only; default none."),
@@ -91,6 +95,7 @@ def identify_command(
 ) -> None:
     """Identify models of a stage from one log or several."""
     from ...identification.fitted.score import share_fitted
+    from ...identification.views.report_page.page import write_report
 
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect(context)
@@ -101,6 +106,8 @@ def identify_command(
     check_each_log(len(files), delay=delay, drift=drift, history=history, weight=weight)
     if checkpoint is not None and len(kinds.names) > 1:
         raise ParameterError("--checkpoint", "given with several models", "one")
+    if report is not None:
+        _check_report(report, len(kinds.names), overwrite=overwrite)
     if validate is None and validate_window is not None:
         raise ParameterError("--validate-window is given without --validate")
     windows = each_of("--window", window, len(files))
@@ -134,6 +141,8 @@ def identify_command(
             )
         fit, score = _judged(fit, second)
         written += _write(fit, out, second)
+        if report is not None:
+            written.append(write_report(fit, report, command=command_line(context)))
         # The result is complete: remove the file of an interrupted search.
         (out / _partial(kind)).unlink(missing_ok=True)
         words.append(fit.summary())
@@ -145,6 +154,19 @@ def identify_command(
             words += [f"note  {note}" for note in score.notes]
         documents.append({**fit.document(), "notes": fit.notes})
     result.show("\n\n".join(words), {"models": documents}, written)
+
+
+def _check_report(report: Path, models: int, *, overwrite: bool) -> None:
+    """Refuse a report that cannot be written before the computation."""
+    from ..._support.page.file import page_file
+
+    page_file("--report", report)
+    if models > 1:
+        raise ParameterError("--report", "given with several models", "one")
+    if not report.parent.is_dir():
+        raise ParameterError("--report", f"'{report}'", "a file in a folder that exists")
+    if report.exists() and not overwrite:
+        raise ParameterError(f"{report} exists: expected --overwrite, or another --report")
 
 
 def _files(

@@ -1,4 +1,4 @@
-"""``piezotrack suggest``: what to measure next."""
+"""``piezotrack suggest``: the drive to measure next."""
 
 from __future__ import annotations
 

@@ -151,6 +151,8 @@ class LogInfo:
         lines += ["", *self._of_time(), *self._of_drive()]
         if self.determines:
             lines += ["", "can determine", *(f"  {text}" for text in self.determines)]
+            if self.drive is not None and self.drive.turns and self.stroke:
+                lines.append("  for what is not in it, with a first model: piezotrack suggest")
         lines += [f"note  {note}" for note in self.notes]
         if self.problem:
             lines += ["", f"is not read as it is: {self.problem}"]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ... import _core
 from ..._support.messages import listed, quoted
 from ...errors import ExecutorError, ParameterError, PiezotrackError
+from ..confidence.estimate import with_covariance
 from ..methods.choice import MethodChoice
 from ..problem.fingerprint import as_plain_data, exact_text, hash_of
 from ..problem.problem import AUTO, Problem
@@ -115,7 +116,7 @@ def run_task(task: Task, stopped: Callable[[], bool] | None = None) -> dict[str,
     methods = task.methods if task.seed is None else task.methods.seeded(task.seed)
     entry = {"task": task.name, "seed": task.seed, "settings": task.settings}
     try:
-        fit = solve(task.problem, methods, run)
+        fit = with_covariance(solve(task.problem, methods, run))
     except (PiezotrackError, MemoryError) as error:
         return {
             "format": FAILURE,

@@ -1,1 +1,1 @@
-"""How sure a model is, and what a further record would tell."""
+"""How sure an identification is, and what to measure next."""

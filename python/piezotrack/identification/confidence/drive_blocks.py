@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Block", "Span", "blocks_of", "reach"]
+__all__ = ["SHORTEST", "Block", "Span", "blocks_of", "reach"]
 
 # Samples of the shortest period, and share of the range below which a sine is left out.
 SHORTEST, SMALLEST = 20, 0.02
@@ -81,7 +81,9 @@ def reach(start: float, end: float, step: float) -> Array:
     return np.linspace(start, end, count + 1)[1:]
 
 
-def blocks_of(span: Span, count: int, dt: float, seed: int) -> list[Block]:
+def blocks_of(
+    span: Span, count: int, dt: float, seed: int, shortest: int = SHORTEST
+) -> list[Block]:
     """List the blocks that a drive is chosen from.
 
     Parameters
@@ -94,6 +96,8 @@ def blocks_of(span: Span, count: int, dt: float, seed: int) -> list[Block]:
         Sampling interval [s].
     seed : int
         Of the random steps.
+    shortest : int, optional
+        Samples of the shortest period.
 
     Returns
     -------
@@ -102,10 +106,10 @@ def blocks_of(span: Span, count: int, dt: float, seed: int) -> list[Block]:
     """
     every = [
         *_levels(span),
-        *_sines(span, count, dt),
+        *_sines(span, count, dt, shortest),
         *_triangles(span, count, dt),
-        *_sweeps(span, count, dt),
-        *_multisines(span, count, dt, seed),
+        *_sweeps(span, count, dt, shortest),
+        *_multisines(span, count, dt, seed, shortest),
         *_steps(span, count, seed),
     ]
     return [one for one in every if _is_slow(one.shape(count), span)]
@@ -116,9 +120,9 @@ def _is_slow(volts: Array, span: Span) -> bool:
     return volts.size < 2 or float(np.abs(np.diff(volts)).max()) <= span.step * (1.0 + 1e-9)
 
 
-def _periods(count: int) -> list[float]:
+def _periods(count: int, shortest: int) -> list[float]:
     """Cycles per block, an octave apart."""
-    most = count / SHORTEST
+    most = count / shortest
     return [2.0**k for k in range(-1, 1 + max(0, int(math.log2(max(most, 1.0)))))]
 
 
@@ -129,9 +133,9 @@ def _levels(span: Span) -> Iterator[Block]:
     yield Block("slow ramp down", lambda n: np.linspace(span.high, span.low, n))
 
 
-def _sines(span: Span, count: int, dt: float) -> Iterator[Block]:
+def _sines(span: Span, count: int, dt: float, shortest: int) -> Iterator[Block]:
     whole = span.high - span.low
-    for cycles in _periods(count):
+    for cycles in _periods(count, shortest):
         rate = 2.0 * math.pi * cycles / count
         for low, high in ((0.0, 1.0), (0.0, 0.5), (0.25, 0.75), (0.5, 1.0), (0.4, 0.6)):
             size = min(0.5 * whole * (high - low), USED * span.step / rate)
@@ -192,8 +196,8 @@ def _triangle(
     return np.asarray(span.at(anchor) + size * part * wave)
 
 
-def _sweeps(span: Span, count: int, dt: float) -> Iterator[Block]:
-    octaves = math.log(max(count / SHORTEST, 2.0))
+def _sweeps(span: Span, count: int, dt: float, shortest: int) -> Iterator[Block]:
+    octaves = math.log(max(count / shortest, 2.0))
     rate = 2.0 * math.pi / count
     half = 0.5 * (span.high - span.low)
 
@@ -206,10 +210,10 @@ def _sweeps(span: Span, count: int, dt: float) -> Iterator[Block]:
     yield Block(f"sweep {1.0 / (count * dt):.3g} to {top:.3g} Hz", shape)
 
 
-def _multisines(span: Span, count: int, dt: float, seed: int) -> Iterator[Block]:
+def _multisines(span: Span, count: int, dt: float, seed: int, shortest: int) -> Iterator[Block]:
     """Add up sines whose amplitudes fall with the root of the frequency."""
-    for most in (4.0, 16.0, count / SHORTEST):
-        if not 2.0 <= most <= count / SHORTEST:
+    for most in (4.0, 16.0, count / shortest):
+        if not 2.0 <= most <= count / shortest:
             continue
         lines = np.geomspace(1.0, most, 10)
         phases = np.random.default_rng([seed, int(most)]).uniform(0.0, 2.0 * math.pi, lines.size)

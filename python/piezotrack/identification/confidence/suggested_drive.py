@@ -1,4 +1,4 @@
-"""What to measure next: the drive whose record determines the parameters best."""
+"""Choice of the drive to measure next, whose record determines the parameters best."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ...stages.base import Stage
 from ..fitted.identification import Identification
 from ..fitted.identified_model import IdentifiedModel
 from ..solve.weights import CHOSEN
-from .drive_blocks import Block, Span, blocks_of, reach
+from .drive_blocks import SHORTEST, Block, Span, blocks_of, reach
 
 if TYPE_CHECKING:
     import os
@@ -42,6 +42,8 @@ WIDEST = 10.0
 ROUGH, FINE = 1e-8, 1e-10
 # Numbers of blocks that are tried, and the least samples of a block.
 COUNTS, FEWEST = (4, 8, 16), 25
+# Samples times values from which on blocks are judged by every second sample, and so on.
+BUDGET, THINNEST = 60_000, 10
 # Blocks of a place that are tried again after the others are chosen, and times that it is done.
 AGAIN, SWEEPS = 5, 2
 # Cycles of the plain sine.
@@ -62,7 +64,7 @@ class ExpectedDeviation(NamedTuple):
     unit : str
         SI; empty where there is none.
     deviation : float
-        Standard deviation with the suggested drive; infinite where it does not show.
+        Standard deviation with the suggested drive; infinite above five times the value.
     of_sine : float
         With a plain sine over the limits, of the same length.
     of_record : float or None
@@ -214,7 +216,8 @@ def suggest_drive(
     The drive is a sequence of blocks, 4, 8 or 16 of equal length: sines, growing and shrinking
     triangles, a fast sine upon a slow one, sweeps, random steps, ramps and rests. They are chosen
     one after the other, each for the largest determinant so far, and then exchanged one by one
-    (Fedorov 1972, Theory of Optimal Experiments, chapter 3). The deviations are
+    (Fedorov 1972, Theory of Optimal Experiments, chapter 3). With many samples and
+    values the blocks are judged by every second to tenth sample. The deviations are
     :math:`\sigma \sqrt{[(J^T J)^{-1}]_{jj}}`: the Cramer-Rao bound under white noise, as far as the
     model is right.
 
@@ -366,8 +369,10 @@ class _Truth:
         The stage.
     fitted : tuple of _Value
         The values.
-    pairs : tuple of (Stage, Stage, float)
-        With the larger and the smaller value, and their relative difference.
+    stages : tuple of Stage
+        The stage and those that differ in one value.
+    pairs : tuple of (int, int, float)
+        For each value the stages with more and with less of it, and their relative difference.
     offset : bool
         Whether an offset is fitted.
     drift : float or None
@@ -376,7 +381,8 @@ class _Truth:
 
     stage: Any
     fitted: tuple[_Value, ...]
-    pairs: tuple[tuple[Any, Any, float], ...]
+    stages: tuple[Any, ...]
+    pairs: tuple[tuple[int, int, float], ...]
     offset: bool = True
     drift: float | None = None
 
@@ -384,13 +390,16 @@ class _Truth:
     def of(cls, model: IdentifiedModel | Stage) -> _Truth:
         """Return the truth that a model is taken for."""
         stage: Any = model.model if isinstance(model, IdentifiedModel) else model
-        fitted, pairs = [], []
+        fitted: list[_Value] = []
+        stages: list[Any] = [stage]
+        pairs: list[tuple[int, int, float]] = []
         for value in _fitted(model, stage):
             for ways in ((MOVE, -MOVE), (MOVE, 0.0), (0.0, -MOVE)):
                 both = [value.moved(stage, way) for way in ways]
                 if None not in both:
                     fitted.append(value)
-                    pairs.append((both[0], both[1], ways[0] - ways[1]))
+                    pairs.append((len(stages), len(stages) + 1, ways[0] - ways[1]))
+                    stages += both
                     break
         if not fitted:
             raise ParameterError("model", "no values that are fitted", "some", verb="has")
@@ -398,7 +407,24 @@ class _Truth:
         if isinstance(model, IdentifiedModel):
             drift = None if model.drift is None else model.drift.time
             of_sensor = {"offset": model.offset_fitted, "drift": drift}
-        return cls(stage=stage, fitted=tuple(fitted), pairs=tuple(pairs), **of_sensor)
+        return cls(
+            stage=stage,
+            fitted=tuple(fitted),
+            stages=tuple(stages),
+            pairs=tuple(pairs),
+            **of_sensor,
+        )
+
+    def one_sided(self) -> _Truth:
+        """Differences from the stage itself, at half the number of simulations."""
+        moved, pairs = [], []
+        for j, (up, down, apart) in enumerate(self.pairs):
+            is_central = apart > 1.5 * MOVE
+            which = up if is_central or self.stages[up] != self.stage else down
+            way = MOVE if which == up else -MOVE
+            moved.append(self.stages[which])
+            pairs.append((j + 1, 0, way))
+        return replace(self, stages=(self.stage, *moved), pairs=tuple(pairs))
 
     def values(self) -> list[tuple[str, float, str]]:
         """Name, value and unit of each."""
@@ -415,7 +441,7 @@ class _Truth:
     def beginning(self, volts: float) -> list[StageState | None]:
         """State of each stage in equilibrium under a voltage, from never moved."""
         states: list[StageState | None] = []
-        for stage in (one for pair in self.pairs for one in pair[:2]):
+        for stage in self.stages:
             try:
                 states.append(stage.equilibrium(volts))
             except NumericalError:
@@ -432,15 +458,16 @@ class _Truth:
     ) -> tuple[Array, list[StageState | None]]:
         """Sensitivities [m] at samples that follow a voltage, and the states at the last one."""
         drive = np.concatenate([[volts], u])
-        columns, last = np.empty((u.size, len(self.pairs))), []
-        for j, (up, down, apart) in enumerate(self.pairs):
-            runs = [
-                one.simulate(drive, dt, initial=states[2 * j + i], accuracy=accuracy)
-                for i, one in enumerate((up, down))
-            ]
-            columns[:, j] = (runs[0].x[1:] - runs[1].x[1:]) / apart
-            last += [run.final for run in runs]
-        return columns, last
+        runs = [
+            stage.simulate(drive, dt, initial=state, accuracy=accuracy)
+            for stage, state in zip(self.stages, states, strict=True)
+        ]
+        columns = self.columns_of([run.x[1:] for run in runs])
+        return columns, [run.final for run in runs]
+
+    def columns_of(self, x: Sequence[Array]) -> Array:
+        """Sensitivities, of the displacements of the stages [m]."""
+        return np.column_stack([(x[up] - x[down]) / apart for up, down, apart in self.pairs])
 
     def gram_of(self, columns: Array, t: Array) -> Array:
         """Products of the sensitivities and the columns of the sensor at some instants."""
@@ -451,10 +478,8 @@ class _Truth:
 
     def gram_at_rest(self, states: Sequence[StageState | None]) -> Array:
         """Products at the first sample, where the stages are in these states."""
-        x = [0.0 if one is None else float(one.x) for one in states]
-        apart = [pair[2] for pair in self.pairs]
-        columns = (np.array(x[::2]) - np.array(x[1::2])) / np.array(apart)
-        return self.gram_of(columns[None, :], np.zeros(1))
+        x = [np.array([0.0 if one is None else float(one.x)]) for one in states]
+        return self.gram_of(self.columns_of(x), np.zeros(1))
 
     def gram(self, u: Array, dt: float) -> Array:
         """Products over a whole drive, from equilibrium under its first sample."""
@@ -531,21 +556,27 @@ class _Search:
     def __init__(
         self, truth: _Truth, span: Span, samples: int, dt: float, noise: float, seed: int
     ) -> None:
-        self.truth, self.span, self.dt, self.noise = truth, span, dt, noise
+        self.truth, self.span, self.dt, self.noise = truth.one_sided(), span, dt, noise
+        self.thin = min(THINNEST, -(-samples * len(truth.pairs) // BUDGET))
         self.home = min(max(0.0, span.low), span.high)
         self.samples = samples
         # The way back is kept free at the end.
         way = max(abs(self.home - span.low), abs(span.high - self.home)) / span.step
         self.room = samples - 1 - math.ceil(way)
         self.blocks = {
-            count: blocks_of(span, self.room // count, dt, seed) for count in self.counts()
+            count: blocks_of(span, self._length(count), dt, seed, max(SHORTEST, 4 * self.thin))
+            for count in self.counts()
         }
-        states = truth.beginning(self.home)
-        self.begin = _Place(self.home, states, truth.gram_at_rest(states), 1)
+        states = self.truth.beginning(self.home)
+        self.begin = _Place(self.home, states, self.truth.gram_at_rest(states), 1)
 
     def counts(self) -> list[int]:
         """Numbers of blocks that leave enough samples for each."""
         return [n for n in COUNTS if self.room // n >= FEWEST] or [COUNTS[0]]
+
+    def _length(self, count: int) -> int:
+        """Return the samples of each of so many blocks, a multiple of the thinning."""
+        return self.room // count // self.thin * self.thin
 
     def plan(self, count: int) -> _Plan:
         """Choose the blocks of a drive of so many."""
@@ -592,15 +623,16 @@ class _Search:
 
     def _after(self, place: _Place, block: Block, count: int) -> _Place | None:
         """Where a block leads to; None where it is too fast from there, or cannot be simulated."""
-        u = block.after(place.volts, self.room // count, self.span)
+        u = block.after(place.volts, self._length(count), self.span)
         if u is None:
             return None
+        judged, dt = u[self.thin - 1 :: self.thin], self.thin * self.dt
         try:
-            columns, states = self.truth.after(place.states, place.volts, u, self.dt, ROUGH)
+            columns, states = self.truth.after(place.states, place.volts, judged, dt, ROUGH)
         except NumericalError:
             return None
-        t = self.dt * np.arange(place.samples, place.samples + u.size, dtype=np.float64)
-        gram = place.gram + self.truth.gram_of(columns, t)
+        t = self.dt * (place.samples - 1) + dt * np.arange(1, judged.size + 1, dtype=np.float64)
+        gram = place.gram + self.thin * self.truth.gram_of(columns, t)
         return _Place(float(u[-1]), states, gram, place.samples + u.size)
 
     def _score(self, place: _Place | None) -> float:
@@ -609,7 +641,7 @@ class _Search:
     def whole(self, plan: _Plan) -> Array:
         """Drive of a plan, from home and back [V]."""
         count = len(plan.chosen)
-        return self._whole([self.blocks[count][k] for k in plan.chosen], self.room // count)
+        return self._whole([self.blocks[count][k] for k in plan.chosen], self._length(count))
 
     def _whole(self, blocks: Sequence[Block], length: int) -> Array:
         parts = [np.array([self.home])]
@@ -647,14 +679,12 @@ def _record_spread(model: IdentifiedModel | Stage, truth: _Truth, noise: float) 
         how: dict[str, Any] = (
             {"initial": start.state} if start.history == "fit" else {"history": start.history}
         )
-        columns = []
-        for up, down, apart in truth.pairs:
-            runs = [
-                IdentifiedModel(**{**kept, "model": one}).simulate(data, offset=0.0, **how)
-                for one in (up, down)
-            ]
-            columns.append(data.counted(runs[0].x - runs[1].x) / apart)
-        gram: Any = truth.gram_of(np.column_stack(columns), data.counted(data.t - data.t[0]))
+        runs = [
+            IdentifiedModel(**{**kept, "model": one}).simulate(data, offset=0.0, **how)
+            for one in truth.stages
+        ]
+        columns = truth.columns_of([data.counted(run.x) for run in runs])
+        gram: Any = truth.gram_of(columns, data.counted(data.t - data.t[0]))
         grams = grams + truth.information(gram)
     bare: _Truth = replace(truth, offset=False, drift=None)
     return bare.spread(grams, noise)

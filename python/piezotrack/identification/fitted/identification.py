@@ -21,15 +21,20 @@ from .identified_model import IdentifiedModel
 from .notes import above_noise, deviation_of, drift_notes, first_samples, fit_percent, lag_notes
 
 if TYPE_CHECKING:
+    import datetime
+    import os
     from collections.abc import Mapping
+    from pathlib import Path
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
+    from ..._support.display.result import Result
     from ...data.dataset import Dataset
     from ...stages.motion import Response
     from ..methods.least_squares import LeastSquares
+    from .covariance import Covariance
     from .estimates import Constraint, Estimate, LagRange, SearchRun, StopReason
     from .score import Score
     from .selection import Selection
@@ -73,6 +78,8 @@ class Identification(IdentifiedModel):
         Lags that fit as well, where the drive is too slow to tell them from hysteresis and creep.
     selection : Selection or None
         The choice between models; None without ``model="auto"``.
+    covariance : Covariance or None
+        How sure the values are; None where the record is too short for it.
     at_bound : bool
         Whether least squares left a time constant or a frequency on a bound of its range.
     """
@@ -83,6 +90,7 @@ class Identification(IdentifiedModel):
         "html": "identification.views.html:identification_html",
         "convergence": "identification.views.plot:plot_convergence",
         "residual": "identification.views.confidence.residual_plot:plot_fit_residual",
+        "report": "identification.views.report_page.page:write_report",
     }
 
     data: Dataset
@@ -95,6 +103,7 @@ class Identification(IdentifiedModel):
     search: SearchRun | None = None
     lags: LagRange | None = None
     selection: Selection | None = None
+    covariance: Covariance | None = None
     at_bound: bool = False
 
     def __post_init__(self) -> None:
@@ -341,6 +350,58 @@ class Identification(IdentifiedModel):
         """
         drawn: Figure = self.view("residual")(self, record, fig)
         return drawn
+
+    def report(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        controller: Result | None = None,
+        suggestion: Result | None = None,
+        date: datetime.date | None = None,
+    ) -> Path:
+        """Write a report of the stage for readers who do not know the package.
+
+        The file has gain, loop, errors and noise, the pictures, the parameters with their
+        intervals, the verdicts and notes, and what repeats the fit: hashes, versions and the call.
+
+        Parameters
+        ----------
+        path : path-like
+            The file: ``.html``, which loads nothing from elsewhere, or ``.pdf``. A temporary file
+            is written and renamed, so that an existing file is replaced only when the new one is
+            complete.
+        controller : Result, optional
+            A controller for the stage and its margins, as `piezotrack.tune` returns it.
+        suggestion : Result, optional
+            What to measure next, as `piezotrack.suggest_drive` returns it.
+        date : datetime.date, optional
+            Date below the title; today where not given. All else depends on the fit alone.
+
+        Returns
+        -------
+        pathlib.Path
+            The file written.
+
+        Raises
+        ------
+        ParameterError
+            The file has another ending, or an argument is of another type.
+        DataError
+            The file cannot be written.
+
+        Examples
+        --------
+        >>> import os, tempfile
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:8.0]
+        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+        >>> fit.report(os.path.join(tempfile.mkdtemp(), "report.html")).name
+        'report.html'
+        """
+        written: Path = self.view("report")(
+            self, path, controller=controller, suggestion=suggestion, date=date
+        )
+        return written
 
 
 def _frequency(data: Dataset) -> float:

@@ -18,8 +18,8 @@ from ...data.checks.fast_drive import CURVED, is_fast
 from ...data.dataset import Dataset
 from ...data.resampling import interpolated
 from ...errors import ParameterError, ShapeError
+from ...stages.delayed_reading import delayed_reading
 from ...stages.slow_loop import SlowLoop
-from .delayed_reading import delayed_reading
 from .drift import drift_entry
 from .fitted_record import record_entries, record_of
 from .model_entries import (

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["identify_best", "is_white", "models_tried", "two_parts"]
+__all__ = ["identify_best", "is_white", "models_tried", "period_of", "two_parts"]
 
 # Models whose weights follow by least squares, the simpler first; and models that are searched.
 LEAST_SQUARES = (
@@ -256,19 +256,38 @@ def repeated(data: Dataset) -> float:
     float
         Standard deviation of the difference between periods, over the root of 2.
     """
+    period = period_of(data)
+    if period is None:
+        return 0.0
+    return float(np.std(data.y[period:] - data.y[:-period])) / math.sqrt(2.0)
+
+
+def period_of(data: Dataset) -> int | None:
+    """Return the period of a drive that repeats.
+
+    Parameters
+    ----------
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    int or None
+        In samples; None where the drive does not repeat within the window.
+    """
     u = data.u - data.u.mean()
     turns = np.array(_core.turns(data.u, 0.5 * float(np.ptp(data.u))), dtype=np.intp)
     if turns.size < 4:
-        return 0.0
+        return None
     period = round(float(np.median(turns[2:] - turns[:-2])))
     near = [p for p in (period - 1, period, period + 1) if 8 <= p <= u.size // 2]
     if not near:
-        return 0.0
+        return None
     gap = {p: float(np.std(u[p:] - u[:-p])) for p in near}
     best = min(gap, key=gap.__getitem__)
     if gap[best] > SAME_PERIOD * float(np.std(u)):
-        return 0.0
-    return float(np.std(data.y[best:] - data.y[:-best])) / math.sqrt(2.0)
+        return None
+    return best
 
 
 def best_of(tried: Sequence[Tried], better: float = BETTER) -> Tried:

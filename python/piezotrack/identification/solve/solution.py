@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..problem.problem import AUTO
@@ -46,4 +47,18 @@ def solve(problem: Problem, methods: MethodChoice, run: Run) -> Identification:
             return identify_model(one, methods.method(one.info), run)
         return identify_best(one, methods, run)
 
-    return with_interpolation_tried(problem, identify)
+    return _with_arguments(with_interpolation_tried(problem, identify), problem)
+
+
+def _with_arguments(fit: Identification, problem: Problem) -> Identification:
+    """Put the arguments that are not the defaults into the provenance of a fit."""
+    given = {name: value for name, value in problem.settings().items() if name != "model"}
+    records = problem.record_settings()
+    if len(records) == 1:
+        given |= records[0]
+    elif any(records):
+        given["records"] = records
+    if not given:
+        return fit
+    origin = {**fit.details["provenance"], "arguments": given}
+    return replace(fit, details={**fit.details, "provenance": origin})

@@ -6,15 +6,17 @@ import math
 from typing import TYPE_CHECKING
 
 from ..._support.display.table import words
+from .confidence.residual_report import fit_notes
 from .quantities import errors_of, of_sensor, of_stage
 from .report import parameter_notes
 
 if TYPE_CHECKING:
+    from ..._support.display.table import Table
     from ...data.dataset import Dataset
     from ..fitted.estimates import Constraint, Estimate
     from ..fitted.identification import Identification
 
-__all__ = ["identification_html"]
+__all__ = ["identification_html", "records_table"]
 
 
 def identification_html(fit: Identification) -> str:
@@ -29,10 +31,10 @@ def identification_html(fit: Identification) -> str:
     else:
         rows.append(("rms error", f"{fit.cost_um:.4g} um, {fit.cost_percent:.3g} % of stroke"))
     rows += [("constraint", _constraint(one)) for one in fit.constraints]
-    rows += [("note", note) for note in fit.notes]
+    rows += [("note", note) for note in fit_notes(fit)]
     tables = [words(f"Identification: {fit.model.info.title}", rows).html()]
     if len(fit.records) > 1:
-        tables.append(_records(fit))
+        tables.append(records_table(fit).html())
     if fit.parameters:
         found = [_estimate(fit, name, one) for name, one in fit.parameters.items()]
         heads = ("parameter", "symbol", "value", "unit", "standard deviation")
@@ -44,7 +46,7 @@ def _record(data: Dataset) -> tuple[str, str]:
     return "record", f"{data.source or 'unnamed'}: {data!r}"
 
 
-def _records(fit: Identification) -> str:
+def records_table(fit: Identification) -> Table:
     """Write what each of several records has of its own."""
     heads = (
         "record",
@@ -69,7 +71,7 @@ def _records(fit: Identification) -> str:
         )
         for i, (record, score) in enumerate(zip(fit.records, fit.scores, strict=True))
     ]
-    return words("Records", rows, heads).html()
+    return words("Records", rows, heads)
 
 
 def _estimate(fit: Identification, name: str, estimate: Estimate) -> tuple[str, ...]:

@@ -6,8 +6,12 @@ import math
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..._support.units import length_text, of_drive, shown_unit
 from ...errors import NumericalError
+from ...stages.slow_loop import SlowLoop
+from ..confidence.sensitivity import STEP, fitted_values, moved
 from ..fitted.notes import start_notes
 
 if TYPE_CHECKING:
@@ -161,11 +165,30 @@ def _loop(model: IdentifiedModel) -> list[Row]:
     unit, scale = shown_unit(f"m/{per}")
     if unit == "m/N":
         unit, scale = "um/N", 1e6
-    rows = [("gain", f"{scale * loop.gain:.4g} {unit}")]
+    reach = scale * _reach(model)
+    spread = f" +- {reach:.1g}" if math.isfinite(reach) else ""
+    rows = [("gain", f"{scale * loop.gain:.4g}{spread} {unit}")]
     if loop.width > CLOSED * abs(loop.travel):
         share = f"{loop.width_percent:.3g} % of the travel"
         rows.append(("hysteresis", f"{share}, {length_text(loop.width, 3)}"))
     return rows
+
+
+def _reach(model: IdentifiedModel) -> float:
+    """Half of the 95 % interval of the gain of a fit [m/V]; not a number where it is not known."""
+    covariance = getattr(model, "covariance", None)
+    ends = model.drive_range
+    if covariance is None or ends is None:
+        return math.nan
+    values, slopes = fitted_values(model), []
+    for value in values:
+        size = STEP * abs(value.of(model))
+        gains = [
+            math.nan if near is None else SlowLoop.of(near.model, *ends).gain
+            for near in (moved(model, [value], np.array([way * size])) for way in (1.0, -1.0))
+        ]
+        slopes.append((gains[0] - gains[1]) / (2.0 * size) if size else 0.0)
+    return float(covariance.reach(np.nan_to_num(np.array(slopes))))
 
 
 def _creep(stage: Any) -> list[Row]:

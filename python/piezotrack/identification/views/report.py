@@ -11,7 +11,7 @@ from ..fitted.start import GAIN
 from ..methods.descents import Descents
 from ..methods.least_squares import LeastSquares
 from ..methods.particle_swarm import ParticleSwarm
-from .confidence.residual_report import cause_notes
+from .confidence.residual_report import fit_notes
 from .quantities import errors_of, errors_of_file, of_sensor, of_stage, rows
 
 if TYPE_CHECKING:
@@ -24,15 +24,19 @@ if TYPE_CHECKING:
     from ..fitted.identified_model import IdentifiedModel
 
 __all__ = [
+    "determined",
     "identification_files",
+    "list_sentences",
     "model_text",
     "parameter_notes",
     "save_identification",
+    "search_sentences",
     "summary_text",
+    "verdict_sentences",
 ]
 
-# Correlation of neighbouring residuals from which on standard deviations are too small.
-CORRELATED = 0.3
+# Whether a constraint decides the result.
+STATES = {True: "active: the two are equal", False: "not active"}
 # Units of values that a stage gives in um, and the factor for a drive in metres.
 PER_METRE = {"um/V": ("um/um", 1e-6), "1/V": ("1/um", 1e-6)}
 
@@ -51,38 +55,49 @@ def summary_text(fit: Identification) -> str:
         Several lines.
     """
     lines = _of_several(fit) if len(fit.records) > 1 else _of_one(fit)
-    searched, method = fit.model.info.searched, fit.method
-    if isinstance(method, LeastSquares) or fit.search is None:
-        lines.append(f"      least squares, {fit.nfev} simulations")
-    else:
-        search = fit.search
-        if search.cost_with_priors is not None:
-            lines.append(
-                f"      {1e6 * search.cost_with_priors:.4g} um with the priors was minimised"
-            )
-        iterations = f"{search.nit} iterations, " if isinstance(method, ParticleSwarm) else ""
-        how = f"{iterations}{fit.nfev} simulations, seed {method.seed}: {fit.message}"
-        lines += [f"      {how}", *_runs(search, method)]
-        least = min((run.cost for run in search.runs), default=0.0)
-        if isinstance(method, ParticleSwarm) and fit.cost < (1.0 - GAIN) * least:
-            history = fit.start.history if fit.start else ""
-            lines.append(
-                f"      as of a stage that never moved; descents from there with "
-                f"history={history!r} end at {fit.cost_um:.4g} um"
-            )
+    lines += [f"      {one}" for one in search_sentences(fit)]
     lines += _trials(fit)
-    lines += [*(f"note  {note}" for note in _notes(fit)), ""]
-    return "\n".join([*lines, *(_estimates(fit) if searched else _values(fit))])
+    lines += [*(f"note  {note}" for note in fit_notes(fit)), ""]
+    return "\n".join([*lines, *_parameters(fit)])
 
 
-def _notes(fit: Identification) -> list[str]:
-    """Return the notes of a fit, with the cause of its residual in place of a mere shape."""
-    causes, notes = cause_notes(fit), fit.notes
-    if any("is asymmetric" in note for note in notes):
-        causes = [note for note in causes if "asymmetric" not in note]
-    elif causes:
-        notes = [note for note in notes if "the loop has a shape" not in note]
-    return [*notes, *causes]
+def _parameters(fit: Identification) -> list[str]:
+    """List the parameters, and what is known of them."""
+    if fit.model.info.searched:
+        return _estimates(fit)
+    return [*_values(fit), *_certainty(fit)]
+
+
+def search_sentences(fit: Identification) -> list[str]:
+    """Write how a model was found.
+
+    Parameters
+    ----------
+    fit : Identification
+        Result of an identification.
+
+    Returns
+    -------
+    list of str
+        Method, effort, why it ended, and whether several runs agree.
+    """
+    method, search = fit.method, fit.search
+    if isinstance(method, LeastSquares) or search is None:
+        return [f"least squares, {fit.nfev} simulations"]
+    lines = []
+    if search.cost_with_priors is not None:
+        lines.append(f"{1e6 * search.cost_with_priors:.4g} um with the priors was minimised")
+    iterations = f"{search.nit} iterations, " if isinstance(method, ParticleSwarm) else ""
+    lines.append(f"{iterations}{fit.nfev} simulations, seed {method.seed}: {fit.message}")
+    lines += _runs(search, method)
+    least = min((run.cost for run in search.runs), default=0.0)
+    if isinstance(method, ParticleSwarm) and fit.cost < (1.0 - GAIN) * least:
+        history = fit.start.history if fit.start else ""
+        lines.append(
+            f"as of a stage that never moved; descents from there with "
+            f"history={history!r} end at {fit.cost_um:.4g} um"
+        )
+    return lines
 
 
 def model_text(model: IdentifiedModel) -> str:
@@ -168,25 +183,65 @@ def _estimates(fit: Identification) -> list[str]:
     """List what the data determine, and every parameter with its standard deviation."""
     lines = [*_known(fit), ""]
     if fit.scale_assumed:
-        lines += [
-            "parameters, scale assumed: a log of drive and displacement determines no force, so",
-            f"K = {fit.model.stiffness:g} N/m was assumed. {fit.model.info.force_symbols} scale "
-            "with it; for real values give the stiffness.",
-        ]
+        first, second = _assumed(fit)
+        lines += [f"parameters, {first}", second]
     else:
         lines.append("parameters")
     width = 1 + max(3, *(len(estimate.symbol) for estimate in fit.parameters.values()))
     lines.append(f"  {'':<18}{'':<{width}}{'value':>13}  {'':<9}{'standard deviation'}")
     lines += [_row(fit, name, estimate, width) for name, estimate in fit.parameters.items()]
-    lines += [*_lists(fit), *_constraints(fit), *_correlated(fit)]
-    which = "this record" if len(fit.records) == 1 else "these records"
-    if unclear := [n for n, e in fit.parameters.items() if not (e.identified or e.from_prior)]:
-        lines += ["", f"Not determined by {which}: " + ", ".join(unclear) + "."]
-    if known := [n for n, e in fit.parameters.items() if e.from_prior]:
-        lines += ["", f"Known by their priors, not by {which}: " + ", ".join(known) + "."]
-    if fit.search and fit.search.nfail:
-        lines += ["", f"{fit.search.nfail} simulations diverged; their cost counted as infinite."]
+    lines += [*(f"  {one}" for one in list_sentences(fit)), *_constraints(fit), *_certainty(fit)]
+    lines += [line for sentence in _undetermined(fit) for line in ("", sentence)]
     return lines
+
+
+def _assumed(fit: Identification) -> tuple[str, str]:
+    """Say that the scale of the forces was assumed."""
+    return (
+        "scale assumed: a log of drive and displacement determines no force, so",
+        f"K = {fit.model.stiffness:g} N/m was assumed. {fit.model.info.force_symbols} scale "
+        "with it; for real values give the stiffness.",
+    )
+
+
+def _undetermined(fit: Identification) -> list[str]:
+    """Name the parameters that the records do not determine, and simulations that diverged."""
+    which = "this record" if len(fit.records) == 1 else "these records"
+    lines = []
+    if unclear := [n for n, e in fit.parameters.items() if not (e.identified or e.from_prior)]:
+        lines.append(
+            f"Not determined by {which}: {', '.join(unclear)}.\n"
+            "What to measure next: piezotrack suggest, in Python pt.suggest_drive."
+        )
+    if known := [n for n, e in fit.parameters.items() if e.from_prior]:
+        lines.append(f"Known by their priors, not by {which}: " + ", ".join(known) + ".")
+    if fit.search and fit.search.nfail:
+        lines.append(f"{fit.search.nfail} simulations diverged; their cost counted as infinite.")
+    return lines
+
+
+def verdict_sentences(fit: Identification) -> list[str]:
+    """Write what the data of a search determine, and how far its deviations can be trusted.
+
+    Parameters
+    ----------
+    fit : Identification
+        Result of an identification.
+
+    Returns
+    -------
+    list of str
+        Sentences; none after least squares.
+    """
+    if not fit.parameters:
+        return []
+    known, _ = determined(fit)
+    values = ", ".join(f"{symbol} = {value:.6g} {unit}".rstrip() for symbol, value, unit in known)
+    lines = [f"The data determine {values or 'no parameter'}."]
+    if fit.scale_assumed:
+        lines.append("Parameters: " + " ".join(_assumed(fit)))
+    lines += [f"Constraint {one.text}: {STATES[one.active]}." for one in fit.constraints]
+    return [*lines, *(one for one in _certainty(fit) if one), *_undetermined(fit)]
 
 
 def _values(fit: IdentifiedModel) -> list[str]:
@@ -198,38 +253,36 @@ def _values(fit: IdentifiedModel) -> list[str]:
             unit, scale = shown_unit(of_drive(parameter.unit, fit.drive_unit))
             row = f"  {parameter.name:<22}{parameter.symbol:<6}{scale * value:>12.6g}  {unit}"
             lines.append(row.rstrip())
-    return [*lines, *_lists(fit)]
+    return [*lines, *(f"  {one}" for one in list_sentences(fit))]
 
 
-def _lists(fit: IdentifiedModel) -> list[str]:
+def list_sentences(fit: IdentifiedModel) -> list[str]:
     """Name the parameters that are lists, whose values are in the file of the model."""
     counted: dict[int, list[str]] = {}
     for one in fit.model.info.parameters:
         if one.is_list and (values := getattr(fit.model, one.name)):
             counted.setdefault(len(values), []).append(f"{one.name} {one.symbol}")
     return [
-        f"  {count} value{'s' * (count > 1)} each, in the model file: {', '.join(names)}"
+        f"{count} value{'s' * (count > 1)} each, in the model file: {', '.join(names)}"
         for count, names in counted.items()
     ]
 
 
-def _correlated(fit: Identification) -> list[str]:
-    """Say that the standard deviations are too small, where residuals are correlated.
-
-    Of residuals x_i = r x_(i-1) + white noise, and a parameter that shows slowly, they are so by
-    sqrt((1 + r) / (1 - r)) (Bartlett 1935, doi 10.2307/2342284).
-    """
-    stated = [one.deviation for one in fit.parameters.values() if one.free and one.deviation]
-    known = [one for one in fit.autocorrelations if one > CORRELATED]
-    if not known or not any(map(math.isfinite, stated)):
+def _certainty(fit: Identification) -> list[str]:
+    """Say what of the residual no interval covers, and which values the model decides."""
+    covariance = fit.covariance
+    if covariance is None:
         return []
-    r = min(max(known), 1.0 - 1e-9)
-    factor = math.sqrt((1.0 + r) / (1.0 - r))
-    return [
-        "",
-        f"Neighbouring residuals correlate by {r:.2g}: the standard deviations are lower bounds,",
-        f"up to about {factor:.2g} times too small.",
-    ]
+    lines: list[str] = []
+    if (shares := covariance.shares) is not None:
+        lines.append(
+            f"{length_text(shares.model_error, 3)} of the residual repeats in every period, which "
+            f"no interval covers; noise {length_text(shares.noise, 3)}."
+        )
+    decided = [name for name in covariance.decided_by_model if name in fit.parameters]
+    if decided:
+        lines.append(f"The error of the model, not the noise, decides: {', '.join(decided)}.")
+    return ["", *lines] if lines else []
 
 
 def _runs(search: SearchRun, method: Descents | ParticleSwarm) -> list[str]:
@@ -243,36 +296,57 @@ def _runs(search: SearchRun, method: Descents | ParticleSwarm) -> list[str]:
         if others and others[0] < math.inf:
             most = max(cost for cost in others if cost < math.inf)
             text += f", the others at {others[0]:.4g} to {most:.4g} um"
-        return [f"      {text}"]
+        return [text]
     if len(costs) == 1:
-        return ["      one run: runs=4 would show whether there are other local minima"]
+        return ["one run: runs=4 would show whether there are other local minima"]
     more = ", ..." if len(costs) > 4 else ""
     verdict = f"{search.agreeing_runs} of {len(costs)} runs end within 0.1 % of the best"
-    return [f"      {verdict}: {', '.join(f'{cost:.4g}' for cost in costs[:4])}{more} um"]
+    return [f"{verdict}: {', '.join(f'{cost:.4g}' for cost in costs[:4])}{more} um"]
 
 
-def _known(fit: Identification) -> list[str]:
-    """List the quantities that the data determine at any scale of the forces, and the others."""
+def determined(fit: Identification) -> tuple[list[tuple[str, float, str]], list[str]]:
+    """Return the quantities that the data determine at any scale of the forces, and the others.
+
+    Parameters
+    ----------
+    fit : Identification
+        Result of a search.
+
+    Returns
+    -------
+    known : list of (str, float, str)
+        Symbol, value and unit.
+    unknown : list of str
+        Symbols.
+    """
     ratios = _ratios(fit)
     if "delay" in fit.parameters:
         ratios.append(("delay", "delay", 1e3 * fit.delay, "ms"))
     # A ratio to a stiffness that was searched is determined where both are; a stiffness on its
     # bound makes the others uncertain.
     whole = fit.parameters["stiffness"]
-    known: list[tuple[str, str]] = []
-    unknown: list[tuple[str, str]] = []
+    known: list[tuple[str, float, str]] = []
+    unknown: list[str] = []
     for name, symbol, value, unit in ratios:
         estimate = fit.parameters[name]
         no_ratio = "/" not in symbol
         moves = estimate.free or (estimate.tie is not None and estimate.deviation != 0.0)
         held = not moves and (not whole.free or no_ratio)
         sure = estimate.identified and (whole.precise or no_ratio)
-        if not held:
-            (known if sure else unknown).append((symbol, f"{value:>12.6g}  {unit}"))
+        if not held and sure:
+            known.append((symbol, value, unit))
+        elif not held:
+            unknown.append(symbol)
+    return known, unknown
+
+
+def _known(fit: Identification) -> list[str]:
+    """List the quantities that the data determine at any scale of the forces, and the others."""
+    known, unknown = determined(fit)
     lines = ["determined by the data" if known else "the data determine no parameter"]
-    lines += [f"  {symbol:<10} {text}".rstrip() for symbol, text in known]
+    lines += [f"  {symbol:<10} {value:>12.6g}  {unit}".rstrip() for symbol, value, unit in known]
     if unknown:
-        lines.append("not determined: " + ", ".join(symbol for symbol, _ in unknown))
+        lines.append("not determined: " + ", ".join(unknown))
     return lines
 
 
@@ -291,8 +365,7 @@ def _constraints(fit: Identification) -> list[str]:
     if not fit.constraints:
         return []
     wide = max(len(one.text) for one in fit.constraints)
-    states = {True: "active: the two are equal", False: "not active"}
-    rows = [f"  {one.text:<{wide}}  {states[one.active]}" for one in fit.constraints]
+    rows = [f"  {one.text:<{wide}}  {STATES[one.active]}" for one in fit.constraints]
     return ["", "constraints", *rows]
 
 

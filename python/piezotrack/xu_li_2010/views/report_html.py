@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from html import escape
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
+from ..._support.page.html import svg_text
 from ..apparatus import calibration_file
 from ..experiments.references import RULES
 from ..published import observables
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..reproduction import Reproduction
     from .figures import Drawn
 
-__all__ = ["html_text", "svg_text"]
+__all__ = ["html_text"]
 
 
 def html_text(reproduction: Reproduction, figures: Sequence[Drawn]) -> str:
@@ -194,18 +194,6 @@ def table(heads: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
 def _figure(drawing: Drawn) -> str:
     return (
         f'<figure id="{drawing.name}"><h3>{escape(drawing.title)}</h3>\n'
-        f'<div class="picture">{svg_text(drawing)}</div>\n'
+        f'<div class="picture">{svg_text(drawing.figure, drawing.name)}</div>\n'
         f"<figcaption>{escape(drawing.caption)}</figcaption></figure>"
     )
-
-
-def svg_text(drawing: Drawn) -> str:
-    """Write a picture as an SVG element, reproducibly."""
-    import matplotlib as mpl
-
-    buffer = io.StringIO()
-    # All pictures are on one page, so their ids have to differ.
-    with mpl.rc_context({"svg.hashsalt": drawing.name}):
-        drawing.figure.savefig(buffer, format="svg", metadata={"Date": None})
-    text = buffer.getvalue()
-    return text[text.index("<svg") :]

@@ -4,6 +4,7 @@ mod cost;
 mod descent;
 mod experiments;
 mod identification;
+mod inference;
 mod least_squares;
 mod parameters;
 mod problem;
@@ -23,6 +24,7 @@ pub use experiments::step_response::{
     Conventional, StepReadings, StepResponse, read_step, separate,
 };
 pub use identification::{Identification, OwnResult, identify, identify_together};
+pub use inference::{Covariance, Linearised, covariance};
 pub use least_squares::{
     CreepKind, DynamicsKind, LeastSquaresFit, NodesKind, RecordFit, Settings as WeightsSettings,
     Structure, WeightsDelay, WeightsRecord, identify_weights,

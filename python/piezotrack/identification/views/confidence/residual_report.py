@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from ...confidence.residual import Residual
     from ...fitted.identification import Identification
 
-__all__ = ["cause_notes", "residual_text", "verdict"]
+__all__ = ["fit_notes", "residual_text", "verdict"]
 
 # What each ingredient is called.
 WORDS = {
@@ -95,8 +95,8 @@ def verdict(residual: Residual) -> str:
     return "none of those tried explains the residual"
 
 
-def cause_notes(fit: Identification) -> list[str]:
-    """Name the cause of the residual on each record, where there is one.
+def fit_notes(fit: Identification) -> list[str]:
+    """Return the notes of a fit, with the cause of its residual on each record that has one.
 
     Parameters
     ----------
@@ -106,19 +106,24 @@ def cause_notes(fit: Identification) -> list[str]:
     Returns
     -------
     list of str
-        A sentence for each such record; none of what `Identification.notes` has already.
+        The notes: a cause in place of the note that the loop has another shape, and none that they
+        have already.
     """
-    notes = []
+    notes, causes = fit.notes, []
     for i, record in enumerate(fit.records):
         if record.data is None:
             continue
         residual = residual_of(fit, i)
-        # The notes have the lines of the mains.
-        if residual.cause is not None and residual.cause != "hum":
-            which = f"record {i + 1}: " if len(fit.records) > 1 else ""
-            remedy = _remedy(fit, residual.cause)
-            notes.append(f"{which}{verdict(residual)}{f': try {remedy}' if remedy else ''}")
-    return notes
+        cause = residual.cause
+        # The notes have the lines of the mains, and where a loop is asymmetric.
+        known = cause == "hum" or any("is asymmetric" in note for note in notes)
+        if cause is None or known:
+            continue
+        which = f"record {i + 1}: " if len(fit.records) > 1 else ""
+        remedy = _remedy(fit, cause)
+        causes.append(f"{which}{verdict(residual)}{f': try {remedy}' if remedy else ''}")
+        notes = [note for note in notes if "the loop has a shape" not in note]
+    return [*notes, *causes]
 
 
 def _remedy(fit: Identification, cause: str) -> str | None:

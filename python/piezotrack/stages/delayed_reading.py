@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ... import _core
-from ..._support.arrays import LARGEST
-from ...errors import NumericalError
+from .. import _core
+from .._support.arrays import LARGEST
+from ..errors import NumericalError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...stages.model_info import ModelInfo
-    from ...stages.motion import Response
+    from .model_info import ModelInfo
+    from .motion import Response
 
     Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""A page of words, tables and pictures, as one HTML or PDF file."""

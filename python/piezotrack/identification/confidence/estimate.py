@@ -1,0 +1,224 @@
+"""The covariance of what an identification fitted, from its records."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ... import _core
+from ...errors import DataError, PiezotrackError
+from ..fitted.covariance import Covariance, NoiseShares
+from ..solve.selection import period_of
+from .sensitivity import DELAY, Value, fitted_values, moved, sensitivity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from ...data.dataset import Dataset
+    from ..fitted.estimates import Estimate
+    from ..fitted.identification import Identification
+    from ..fitted.identified_model import IdentifiedModel
+    from .sensitivity import Sensitivity
+
+    Array = NDArray[np.float64]
+
+__all__ = ["covariance_of", "with_covariance"]
+
+# Most samples of a record; of more, means of neighbours.
+MOST, MOST_RESAMPLED = 2**16, 2**12
+# Noises that are resampled, and the seed.
+DRAWS, SEED = 199, 1
+# Level at which intervals are widened, and fewest whole periods that tell noise from model error.
+LEVEL, PERIODS = 0.95, 3
+
+
+def with_covariance(fit: Identification) -> Identification:
+    """Return an identification with its covariance, and the standard deviations of its parameters.
+
+    Parameters
+    ----------
+    fit : Identification
+        As solved.
+
+    Returns
+    -------
+    Identification
+        With `Identification.covariance`; None there, and no deviations, where the record is too
+        short or nothing was fitted.
+    """
+    try:
+        records = [(one.data, one.weight) for one in fit.records if one.data is not None]
+        covariance = covariance_of(fit, records)
+    except PiezotrackError:
+        covariance = None
+    parameters = {
+        name: estimate._replace(deviation=_deviation(fit, covariance, name, estimate))
+        for name, estimate in fit.parameters.items()
+    }
+    entries = dict(fit.details.get("parameters", {}))
+    for name, estimate in parameters.items():
+        if name in entries:
+            known = estimate.deviation is not None and math.isfinite(estimate.deviation)
+            deviation = estimate.deviation if known else None
+            entries[name] = {**entries[name], "standard_deviation": deviation}
+    details: dict[str, Any] = {**fit.details, "parameters": entries}
+    if DELAY in parameters and fit.details.get(DELAY):
+        deviation = parameters[DELAY].deviation
+        known = deviation is not None and math.isfinite(deviation)
+        details[DELAY] = {**fit.details[DELAY], "standard_deviation": deviation if known else None}
+    return replace(fit, covariance=covariance, parameters=parameters, details=details)
+
+
+def _deviation(
+    fit: Identification, covariance: Covariance | None, name: str, estimate: Estimate
+) -> float | None:
+    """Return the standard deviation of a parameter of a search."""
+    if covariance is not None and name in covariance.names:
+        return covariance.deviation(name)
+    if estimate.tie is not None and covariance is not None:
+        return covariance.reach(_gradient(fit, name), level=0.6826894921370859)
+    # On a bound, and of what belongs to a record, for independent residuals.
+    return estimate.deviation
+
+
+def _gradient(fit: Identification, name: str) -> Array:
+    """Change of a tied parameter with each value."""
+    values, slopes = fitted_values(fit), []
+    for value in values:
+        size = 1e-4 * abs(value.of(fit))
+        ends = [moved(fit, [value], np.array([way * size])) for way in (1.0, -1.0)]
+        up, down = (math.nan if one is None else Value(name).of(one) for one in ends)
+        slopes.append((up - down) / (2.0 * size) if size else 0.0)
+    return np.asarray(np.nan_to_num(np.array(slopes, dtype=np.float64)))
+
+
+def covariance_of(
+    model: IdentifiedModel,
+    records: Sequence[tuple[Dataset, float]],
+    *,
+    noise: Literal["not repeated", "residual"] = "not repeated",
+) -> Covariance:
+    """Return the covariance of what was fitted to records.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        With values that were fitted.
+    records : sequence of (Dataset, float)
+        The records with their weights.
+    noise : {"not repeated", "residual"}, optional
+        Whether what repeats with the drive is model error, or all of the residual is noise.
+
+    Returns
+    -------
+    Covariance
+        Of the values of `fitted_values`.
+
+    Raises
+    ------
+    DataError
+        The records have too few samples, or no value was fitted.
+    """
+    values = fitted_values(model)
+    if not values:
+        raise DataError("no value was fitted: expected one or more")
+    sizes = np.array([abs(value.of(model)) or records[0][0].dt for value in values])
+    linear = [
+        _Linear(sensitivity(model, data, values), data, weight, sizes, noise)
+        for data, weight in records
+    ]
+    precision = np.diag(_precision(model, values) * sizes**2).tolist()
+    longest = max(record.samples for record in linear)
+    short = longest <= MOST_RESAMPLED
+    found = _core.linearised_covariance(
+        [record.thinned(MOST) for record in linear], precision, DRAWS if short else 0, SEED
+    )
+    resampled = found[4]
+    if not short:
+        few = [record.thinned(MOST_RESAMPLED) for record in linear]
+        resampled = _core.linearised_covariance(few, precision, DRAWS, SEED)[4]
+    quantiles = np.quantile(np.array(resampled), LEVEL, axis=0)
+    return Covariance(
+        names=tuple(str(value) for value in values),
+        values=np.array([value.of(model) for value in values]),
+        matrix=np.array(found[0]) * np.outer(sizes, sizes),
+        determined=np.array(found[1]),
+        independent=np.sqrt(np.array(found[2])) * sizes,
+        widening=np.maximum(quantiles / NormalDist().inv_cdf(0.5 + 0.5 * LEVEL), 1.0),
+        shifts=np.array(found[3]) * sizes[:, None],
+        samples=sum(record.samples for record in linear),
+        orders=tuple(found[5]),
+        shares=linear[0].shares,
+    )
+
+
+def _precision(model: IdentifiedModel, values: list[Value]) -> Array:
+    """Inverse squares of the widths of the priors, SI; 0 without one."""
+    entries = model.details.get("parameters", {})
+    priors = [entries.get(value.parameter, {}).get("prior") for value in values]
+    return np.array(
+        [0.0 if prior is None else prior[1] ** -2 for prior in priors], dtype=np.float64
+    )
+
+
+class _Linear:
+    """A record that is linearised, its values in shares of their size."""
+
+    def __init__(
+        self,
+        linear: Sensitivity,
+        data: Dataset,
+        weight: float,
+        sizes: Array,
+        noise: Literal["not repeated", "residual"],
+    ) -> None:
+        self.columns, self.nuisance = linear.columns * sizes[:, None], linear.nuisance
+        self.residual, self.weight = linear.residual, weight
+        self.noise, self.shares = _without_repeated(linear.residual, data)
+        if noise == "residual":
+            self.noise = linear.residual
+
+    @property
+    def samples(self) -> int:
+        return self.residual.size
+
+    def thinned(self, most: int) -> tuple[list[Array], list[Array], Array, Array, float]:
+        """Means of neighbours, so many samples at most."""
+        width = -(-self.samples // most)
+
+        def means(signal: Array) -> Array:
+            if width == 1:
+                return signal
+            whole = signal[: signal.size // width * width]
+            return np.asarray(whole.reshape(-1, width).mean(axis=1))
+
+        return (
+            [means(column) for column in self.columns],
+            [means(column) for column in self.nuisance],
+            means(self.residual),
+            means(self.noise),
+            self.weight,
+        )
+
+
+def _without_repeated(residual: Array, data: Dataset) -> tuple[Array, NoiseShares | None]:
+    """Noise of a residual: what does not repeat with the drive; and both shares."""
+    period = period_of(data)
+    if period is None or residual.size != data.u.size:
+        return residual, None
+    count = residual.size // period
+    if count < PERIODS:
+        return residual, None
+    last = residual[-count * period :].reshape(count, period)
+    mean = last.mean(axis=0)
+    phase = (np.arange(residual.size) - residual.size) % period
+    noise = (residual - mean[phase]) * math.sqrt(count / (count - 1))
+    power = float(np.mean(noise**2))
+    repeated = max(float(np.mean(mean**2)) - power / count, 0.0)
+    return noise, NoiseShares(model_error=math.sqrt(repeated), noise=math.sqrt(power))

@@ -1,0 +1,293 @@
+"""Change of the displacement of a record with the values that were fitted to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ...errors import PiezotrackError
+from ..fitted.identified_model import IdentifiedModel
+from ..fitted.start import same_beginning, start_after, start_at_jump
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from ...data.dataset import Dataset
+    from ...stages.motion import StageState
+    from ..fitted.start import Start
+
+    Array = NDArray[np.float64]
+
+__all__ = ["DELAY", "Sensitivity", "Value", "fitted_values", "moved", "sensitivity"]
+
+# Share of a value by which it is moved to see its effect.
+STEP = 1e-4
+# The same of a delay in sampling intervals, and of a voltage before the record in its range.
+LATER, BEFORE = 1e-2, 1e-4
+DELAY = "delay"
+
+
+class Value(NamedTuple):
+    """A number that was fitted.
+
+    Attributes
+    ----------
+    parameter : str
+        The parameter of the stage, or ``"delay"``.
+    entry : int or None
+        Which entry of a list.
+    """
+
+    parameter: str
+    entry: int | None = None
+
+    def __str__(self) -> str:
+        return self.parameter if self.entry is None else f"{self.parameter}[{self.entry}]"
+
+    def of(self, model: IdentifiedModel) -> float:
+        """Return the number in a model, SI."""
+        if self.parameter == DELAY:
+            return model.delay
+        value = getattr(model.model, self.parameter)
+        return float(value if self.entry is None else value[self.entry])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sensitivity:
+    """A record about a fit, linearised.
+
+    Attributes
+    ----------
+    columns : ndarray, shape (p, n)
+        Change of the displacement with each value, in the unit of the value [m/...].
+    nuisance : ndarray, shape (q, n)
+        The same of what belongs to the record alone: offset, drift, voltage before the record,
+        and of one of several records its delay.
+    residual : ndarray, shape (n,)
+        Measured less simulated displacement [m].
+    """
+
+    columns: Array
+    nuisance: Array
+    residual: Array
+
+
+def fitted_values(model: IdentifiedModel) -> list[Value]:
+    """List the numbers that were fitted and are not 0, on a bound or on a constraint.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+
+    Returns
+    -------
+    list of Value
+        Entries of lists one by one; the delay of one record last.
+    """
+    entries = _entries(model)
+    values: list[Value] = []
+    for name in model.model.parameter_names():
+        value, entry = getattr(model.model, name), entries.get(name, {})
+        if value is None or not entry.get("free", False) or entry.get("at_bound", False):
+            continue
+        if isinstance(value, tuple):
+            values += [Value(name, k) for k, number in enumerate(value) if number != 0.0]
+        elif value != 0.0:
+            values.append(Value(name))
+    if len(model.records) <= 1 and model.details.get(DELAY, {}).get("free", False):
+        values.append(Value(DELAY))
+    return values
+
+
+def _entries(model: IdentifiedModel) -> Mapping[str, Any]:
+    entries: Mapping[str, Any] = model.details.get("parameters", {})
+    return entries
+
+
+def moved(model: IdentifiedModel, values: list[Value], changes: Array) -> IdentifiedModel | None:
+    """Return a model some of whose values are changed, with those that are tied to them.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+    values : list of Value
+        What is changed.
+    changes : ndarray, shape (p,)
+        By how much, SI.
+
+    Returns
+    -------
+    IdentifiedModel or None
+        None where a value leaves the range in which there is such a stage.
+    """
+    changed: dict[str, Any] = {}
+    delay = model.delay
+    for value, change in zip(values, changes, strict=True):
+        if value.parameter == DELAY:
+            delay += change
+            continue
+        now = changed.get(value.parameter, getattr(model.model, value.parameter))
+        if value.entry is None:
+            changed[value.parameter] = now + change
+        else:
+            numbers = list(now)
+            numbers[value.entry] += change
+            changed[value.parameter] = tuple(numbers)
+    try:
+        stage = replace(model.model, **{**changed, **_tied(model, changed)})
+    except PiezotrackError:
+        return None
+    return replace(_without_search(model), model=stage, delay=delay)
+
+
+def _tied(model: IdentifiedModel, changed: Mapping[str, Any]) -> dict[str, float]:
+    """Values of the parameters that are tied to others."""
+    entries = _entries(model)
+    if not any("tie" in entry for entry in entries.values()):
+        return {}
+    scalars = [one.name for one in model.model.info.parameters if not one.is_list]
+    ties = [(k, entries[n]["tie"]) for k, n in enumerate(scalars) if "tie" in entries.get(n, {})]
+    values = [changed.get(name, getattr(model.model, name)) for name in scalars]
+    known = [0.0 if value is None else float(value) for value in values]
+    tied = _core.tied_values(model.model.info.name, known, ties)
+    return {scalars[place]: tied[place] for place, _ in ties}
+
+
+def _without_search(model: IdentifiedModel) -> IdentifiedModel:
+    """Return an identified model without the search that found it."""
+    return IdentifiedModel(
+        **{field.name: getattr(model, field.name) for field in fields(IdentifiedModel)}
+    )
+
+
+def sensitivity(model: IdentifiedModel, data: Dataset, values: list[Value]) -> Sensitivity:
+    """Linearise the displacement of a record about an identified model, by central differences.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+    data : Dataset
+        The record, in the window that was fitted.
+    values : list of Value
+        What is moved.
+
+    Returns
+    -------
+    Sensitivity
+        Of the readings that count.
+    """
+    record = _Linearised(model, data)
+    sizes = [_step(value, model, data) for value in values]
+    columns = [record.column(value, size) for value, size in zip(values, sizes, strict=True)]
+    shape = (len(values), record.residual.size)
+    return Sensitivity(
+        columns=np.array(columns).reshape(shape),
+        nuisance=np.array(record.nuisance()).reshape(-1, shape[1]),
+        residual=record.residual,
+    )
+
+
+def _step(value: Value, model: IdentifiedModel, data: Dataset) -> float:
+    return LATER * data.dt if value.parameter == DELAY else STEP * abs(value.of(model))
+
+
+class _Linearised:
+    """A record, the state in which it begins, and its residual."""
+
+    def __init__(self, model: IdentifiedModel, data: Dataset) -> None:
+        self.model, self.data = model, data.without_far_readings()
+        self.start = model.start_on(self.data)
+        known: list[Any] = [model, *model.records]
+        mine = [one for one in known if same_beginning(one.start, self.data)]
+        self.record: Any = mine[-1] if mine else model
+        # A model found by least squares creeps before its record; one that is searched is at rest.
+        self.creeps = not model.model.info.searched
+        # The state at the first sample is not all due to the history: what is left is kept.
+        reading = self.data.counted(self.data.y - self._reading(model, self.start.state))
+        self.residual = reading - self._level(reading)
+
+    def _level(self, reading: Array) -> Array:
+        """Offset and drift that suit a residual best."""
+        columns = self._sensor()
+        if not columns:
+            return np.zeros(reading.size)
+        basis = np.array(columns).T
+        return np.asarray(basis @ np.linalg.lstsq(basis, reading, rcond=1e-12)[0])
+
+    def _sensor(self) -> list[Array]:
+        """Columns of the offset and of the drift's size."""
+        t = self.data.counted(self.data.t)
+        drift = self.record.drift
+        columns = [np.ones(t.size)] if self.record.offset_fitted or drift else []
+        if drift:
+            columns.append(np.exp(-(t - drift.begin) / drift.time))
+        return columns
+
+    def nuisance(self) -> list[Array]:
+        """Columns of what belongs to the record alone."""
+        columns = self._sensor()
+        drift = self.record.drift
+        if drift and drift.time_fitted:
+            t = self.data.counted(self.data.t)
+            ends = [np.exp(-(t - drift.begin) / (s * drift.time)) for s in (1 + STEP, 1 - STEP)]
+            columns.append((ends[0] - ends[1]) / (2.0 * STEP))
+        if self.start.history == "fit" and self.start.voltage is not None:
+            reach = BEFORE * float(np.ptp(self.data.full.u))
+            states = [self._begun(self.model, self.start.voltage + s) for s in (reach, -reach)]
+            up, down = (self._counted(self.model, state) for state in states)
+            columns.append((up - down) / (2.0 * reach))
+        several = len(self.model.records) > 1
+        if several and "delay" in self.record.parameters:
+            columns.append(self._delayed())
+        return columns
+
+    def _delayed(self) -> Array:
+        """Change with the delay of one of several records [m/s]."""
+        step = LATER * self.data.dt
+        at = [
+            tuple(
+                replace(one, delay=one.delay + s) if one is self.record else one
+                for one in self.model.records
+            )
+            for s in (step, -step)
+        ]
+        base = _without_search(self.model)
+        up, down = (self._counted(replace(base, records=all_), self.start.state) for all_ in at)
+        return np.asarray((up - down) / (2.0 * step))
+
+    def column(self, value: Value, size: float) -> Array:
+        """Change of the displacement with a value [m/...]."""
+        for ways in ((1.0, -1.0), (1.0, 0.0), (0.0, -1.0)):
+            models = [moved(self.model, [value], np.array([size * way])) for way in ways]
+            if None not in models:
+                up, down = (self._counted(one, self._begun(one)) for one in models if one)
+                return np.asarray((up - down) / (size * (ways[0] - ways[1])))
+        return np.zeros(self.residual.size)
+
+    def _counted(self, model: IdentifiedModel, state: StageState) -> Array:
+        return np.asarray(self.data.counted(self._reading(model, state)))
+
+    def _reading(self, model: IdentifiedModel, state: StageState) -> Array:
+        """Displacement as it is read, without offset and drift [m]."""
+        return np.asarray(model.simulate(self.data, offset=0.0, initial=state).x) - (
+            model._drift_on(self.data)
+        )
+
+    def _begun(self, model: IdentifiedModel, voltage: float | None = None) -> StageState:
+        """State at the first sample of a model beside the one that was fitted."""
+        start, stage = self.start, model.model
+        if start.history == "rest":
+            return start_at_jump(stage, self.data, start.voltage or 0.0).state
+        volts = start.voltage if voltage is None else voltage
+        if start.history == "fit" and volts is None:
+            return start.state
+        begun: Start = start_after(stage, self.data, start.history, volts, creeps=self.creeps)
+        return begun.state

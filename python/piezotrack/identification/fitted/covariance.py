@@ -1,0 +1,243 @@
+"""Covariance of the values of a fit, and the intervals that follow from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ..._support.messages import quoted
+from ...errors import ParameterError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+__all__ = ["Covariance", "Interval", "NoiseShares"]
+
+# Correlation from which on a pair of values is named.
+CORRELATED = 0.95
+
+
+class Interval(NamedTuple):
+    """An interval of confidence.
+
+    Attributes
+    ----------
+    lower, upper : float
+        Its ends, SI.
+    """
+
+    lower: float
+    upper: float
+
+
+class NoiseShares(NamedTuple):
+    """Parts of the residual of a record with three whole periods of the drive or more.
+
+    Attributes
+    ----------
+    model_error : float
+        Rms of what repeats in every period, which no interval covers [m].
+    noise : float
+        Rms of the rest [m].
+    """
+
+    model_error: float
+    noise: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Covariance:
+    r"""Covariance of the values that were fitted, for residuals that are correlated.
+
+    With the change J of the displacement with each value, and the covariance G of an autoregression
+    that was fitted to the noise,
+
+    .. math:: C = \frac{n}{n - p} (J^T J)^{-1} J^T G J (J^T J)^{-1}
+
+    (Domowitz and White 1982, doi 10.1016/0304-4076(82)90012-3; Ljung 1999, System Identification,
+    section 9.4). A sieve bootstrap (Buehlmann 1997, doi 10.2307/3318584) of the linearised fit
+    gives the factor by which an interval is wider than that of normal deviations.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The values: parameters of the model, entries of lists as ``"weights[2]"``, the delay.
+    values : ndarray, shape (p,)
+        As fitted, SI.
+    matrix : ndarray, shape (p, p)
+        Covariance, SI; of values that are not determined without the directions that have no
+        effect.
+    determined : ndarray of bool, shape (p,)
+        Whether the records determine each value.
+    independent : ndarray, shape (p,)
+        Standard deviations for independent noise of the same size, SI.
+    widening : ndarray, shape (p,)
+        Factor of the 95 % interval, by the bootstrap, over that of normal deviations.
+    shifts : ndarray, shape (p, 2)
+        What generalised least squares would change each value by, and the standard deviation of
+        that difference where the noise alone makes it (Hausman 1978, doi 10.2307/1913827).
+    samples : int
+        Samples of the records.
+    orders : tuple of int
+        Order of the autoregression of each record.
+    shares : NoiseShares or None
+        Model error and noise of the first record, where its drive repeats three times or more.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import piezotrack as pt
+    >>> stage = pt.VirtualStage.of(
+    ...     pt.stages.PrandtlIshlinskiiStage(linear=1e-6, thresholds=[10.0], weights=[0.3e-6]),
+    ...     noise=20e-9,
+    ... )
+    >>> t = np.arange(0.0, 4.0, 2e-3)
+    >>> log = stage.record(30.0 * (1.0 - np.cos(2.0 * np.pi * t)), 2e-3)
+    >>> method = pt.LeastSquares(
+    ...     thresholds=[10.0], creep=False, dynamics=None, dead_zones=0
+    ... )
+    >>> fit = pt.identify(log, "prandtl-ishlinskii", method=method)
+    >>> low, high = fit.covariance.interval("linear")
+    >>> low < 1e-6 < high, high - low < 1e-9
+    (True, True)
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    matrix: Array
+    determined: NDArray[np.bool_]
+    independent: Array
+    widening: Array
+    shifts: Array
+    samples: int
+    orders: tuple[int, ...]
+    shares: NoiseShares | None = None
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations, SI, shape (p,); infinite where a value is not determined."""
+        return np.where(self.determined, np.sqrt(np.diag(self.matrix)), np.inf)
+
+    @property
+    def effective_samples(self) -> Array:
+        """Number of independent samples that would determine each value as well, shape (p,)."""
+        with np.errstate(all="ignore"):
+            return np.asarray(self.samples * (self.independent / self.deviations) ** 2)
+
+    @property
+    def decided_by_model(self) -> tuple[str, ...]:
+        """Values that another weighting of the same residual would move beyond its noise.
+
+        The error of the model, and not the noise, decides them.
+        """
+        moved, spread = self.shifts.T
+        normal = NormalDist().inv_cdf(0.5 + 0.5 * 0.999)
+        beyond = np.abs(moved) > normal * self.widening * spread
+        return tuple(name for name, is_so in zip(self.names, beyond, strict=True) if is_so)
+
+    @property
+    def correlated(self) -> tuple[tuple[str, str, float], ...]:
+        """Pairs of values whose correlation is above 0.95 in size, with it."""
+        sizes = np.sqrt(np.diag(self.matrix))
+        with np.errstate(all="ignore"):
+            correlations = self.matrix / np.outer(sizes, sizes)
+        above, rows, columns = np.abs(correlations) > CORRELATED, *np.triu_indices(len(sizes), 1)
+        pairs = zip(rows, columns, strict=True)
+        return tuple(
+            (self.names[i], self.names[j], float(correlations[i, j]))
+            for i, j in pairs
+            if above[i, j]
+        )
+
+    def deviation(self, name: str) -> float:
+        """Return the standard deviation of a value.
+
+        Parameters
+        ----------
+        name : str
+            Its name, as in `names`.
+
+        Returns
+        -------
+        float
+            SI; infinite where the records do not determine it.
+
+        Raises
+        ------
+        ParameterError
+            There is no such value.
+        """
+        return float(self.deviations[self._place(name)])
+
+    def interval(self, name: str, level: float = 0.95) -> Interval:
+        """Return the interval of confidence of a value.
+
+        Parameters
+        ----------
+        name : str
+            Its name, as in `names`.
+        level : float, optional
+            Between 0 and 1.
+
+        Returns
+        -------
+        Interval
+            SI; infinite where the records do not determine the value.
+
+        Raises
+        ------
+        ParameterError
+            There is no such value, or `level` is no share.
+        """
+        place = self._place(name)
+        reach = float(self.widening[place] * _normal(level) * self.deviations[place])
+        value = float(self.values[place])
+        return Interval(value - reach, value + reach)
+
+    def reach(self, gradient: Array, level: float = 0.95) -> float:
+        """Return half of the interval of a quantity that follows from the values.
+
+        Parameters
+        ----------
+        gradient : ndarray, shape (p,)
+            Its change with each value.
+        level : float, optional
+            Between 0 and 1.
+
+        Returns
+        -------
+        float
+            In the unit of the quantity; infinite where it follows from what is not determined.
+
+        Raises
+        ------
+        ParameterError
+            `level` is no share.
+        """
+        normal = _normal(level)
+        variances = (gradient**2) * np.diag(self.matrix)
+        if not self.determined[variances > 0.0].all():
+            return math.inf
+        whole = float(variances.sum())
+        widening = float(variances @ self.widening) / whole if whole > 0.0 else 1.0
+        return normal * widening * math.sqrt(max(float(gradient @ self.matrix @ gradient), 0.0))
+
+    def _place(self, name: str) -> int:
+        if name not in self.names:
+            raise ParameterError("name", quoted(name), f"one of {', '.join(self.names)}")
+        return self.names.index(name)
+
+
+def _normal(level: float) -> float:
+    """Quantile of a normal deviation's size."""
+    share = _core.as_number("level", level)
+    if not 0.0 < share < 1.0:
+        raise ParameterError("level", share, "a number between 0 and 1")
+    return NormalDist().inv_cdf(0.5 + 0.5 * share)

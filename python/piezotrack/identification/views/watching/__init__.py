@@ -1,0 +1,1 @@
+"""Views of what has changed of a stage."""

@@ -1,0 +1,1 @@
+"""Watching a stage: what a new record of it shows to have changed."""

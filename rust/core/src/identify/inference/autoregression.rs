@@ -1,0 +1,120 @@
+//! Autoregression of a noise: its coefficients, innovations and spectrum.
+
+use core::f64::consts::TAU;
+use libm::sincos;
+
+use crate::signal::index;
+
+/// Highest order of an autoregression.
+const HIGHEST: usize = 20;
+
+/// Samples to a coefficient, at least.
+const EACH: usize = 10;
+
+/// An autoregression, `n_t = sum_k a_k n_(t-k) + v_t`.
+pub(super) struct Autoregression {
+    /// Its coefficients `a_k`; none for white noise.
+    pub coefficients: Vec<f64>,
+    /// Variance of the innovations v, in the square of the noise's unit.
+    pub variance: f64,
+}
+
+impl Autoregression {
+    /// Fits one to a noise, of the order that the criterion of Akaike chooses: Burg's method (Burg
+    /// 1968; Kay 1988, Modern Spectral Estimation, section 7.6), Akaike 1974, doi
+    /// 10.1109/TAC.1974.1100705.
+    pub fn of(noise: &[f64]) -> Self {
+        let count = noise.len();
+        let mut power = noise.iter().map(|x| x * x).sum::<f64>() / index(count.max(1));
+        let (mut forward, mut backward) = (noise.to_vec(), noise.to_vec());
+        let mut a: Vec<f64> = Vec::new();
+        let mut best = Self { coefficients: Vec::new(), variance: power };
+        let mut least = index(count) * libm::log(power.max(f64::MIN_POSITIVE));
+        for order in 1..=HIGHEST.min(count / EACH) {
+            let (mut product, mut squares) = (0.0, 0.0);
+            for t in order..count {
+                product += forward[t] * backward[t - 1];
+                squares += forward[t] * forward[t] + backward[t - 1] * backward[t - 1];
+            }
+            if squares <= 0.0 || squares.is_nan() {
+                break;
+            }
+            let reflection = 2.0 * product / squares;
+            let mut next = a.clone();
+            for (k, value) in next.iter_mut().enumerate() {
+                *value -= reflection * a[order - 2 - k];
+            }
+            next.push(reflection);
+            a = next;
+            for t in (order..count).rev() {
+                let (f, b) = (forward[t], backward[t - 1]);
+                forward[t] = f - reflection * b;
+                backward[t] = b - reflection * f;
+            }
+            power *= 1.0 - reflection * reflection;
+            let criterion =
+                index(count) * libm::log(power.max(f64::MIN_POSITIVE)) + 2.0 * index(order);
+            if criterion < least {
+                least = criterion;
+                best = Self { coefficients: a.clone(), variance: power };
+            }
+        }
+        best
+    }
+
+    /// Spectral density at a frequency, in shares of the sampling rate: the variance of the noise is
+    /// its mean.
+    pub fn density(&self, frequency: f64) -> f64 {
+        let (mut re, mut im) = (1.0, 0.0);
+        let (sine, cosine) = sincos(TAU * frequency);
+        let (mut c, mut s) = (cosine, sine);
+        for a in &self.coefficients {
+            re -= a * c;
+            im += a * s;
+            (c, s) = (c * cosine - s * sine, s * cosine + c * sine);
+        }
+        self.variance / (re * re + im * im)
+    }
+
+    /// Innovations of a noise, from the sample on that has the whole order before it.
+    pub fn innovations(&self, noise: &[f64]) -> Vec<f64> {
+        let order = self.coefficients.len();
+        let of = |window: &[f64]| {
+            let before = window[..order].iter().rev();
+            window[order] - self.coefficients.iter().zip(before).map(|(a, n)| a * n).sum::<f64>()
+        };
+        noise.windows(order + 1).map(of).collect()
+    }
+
+    /// The noise that innovations make, less the first `leading` samples.
+    pub fn noise(&self, innovations: &[f64], leading: usize) -> Vec<f64> {
+        let mut noise: Vec<f64> = Vec::with_capacity(innovations.len());
+        for (t, v) in innovations.iter().enumerate() {
+            let before = noise[t.saturating_sub(self.coefficients.len())..].iter().rev();
+            let value = v + self.coefficients.iter().zip(before).map(|(a, n)| a * n).sum::<f64>();
+            noise.push(value);
+        }
+        noise.split_off(leading.min(innovations.len()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Autoregression;
+    use crate::math::Draws;
+
+    #[test]
+    fn an_autoregression_is_found_again() {
+        let known = Autoregression { coefficients: vec![1.2, -0.5], variance: 4.0 };
+        let drawn: Vec<f64> = (0..20_000).map(|k| 2.0 * Draws::normal(1, k)).collect();
+        let noise = known.noise(&drawn, 100);
+        let found = Autoregression::of(&noise);
+        assert!((found.variance / 4.0 - 1.0).abs() < 0.05);
+        assert!((found.coefficients[0] - 1.2).abs() < 0.05);
+        for f in [0.0, 0.05, 0.1, 0.3, 0.5] {
+            assert!((found.density(f) / known.density(f) - 1.0).abs() < 0.3);
+        }
+        let back = known.innovations(&noise);
+        assert!(back.iter().zip(&drawn[102..]).all(|(a, b)| (a - b).abs() < 1e-12));
+    }
+}

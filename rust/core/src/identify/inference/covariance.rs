@@ -1,0 +1,340 @@
+//! Covariance of the values of a fit by least squares whose residual is correlated.
+//!
+//! With the change J of the displacement with each value, the residual e and B = (J'J)^-1, the
+//! covariance is B M B n / (n - p), M = J' G J, in which G is the covariance of an autoregression
+//! that was fitted to the residual: Domowitz and White 1982, doi 10.1016/0304-4076(82)90012-3; Ljung
+//! 1999, System Identification, section 9.4.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::autoregression::Autoregression;
+use super::fourier::transform;
+use super::resampling::{Bins, studentised};
+use crate::error::{Error, Result};
+use crate::math::on_all_threads;
+use crate::signal::index;
+
+/// Share of an eigenvalue below which its direction does not change the displacement.
+const ROUNDING: f64 = 1e-10;
+
+/// Share of a value's direction without effect from which on it is not determined.
+const WITHOUT: f64 = 1e-6;
+
+/// Parts of the frequencies that are summed side by side.
+const PARTS: usize = 16;
+
+/// Least share of the variance that the difference of two estimates has, for rounding.
+const LEAST: f64 = 1e-4;
+
+/// A record about a fit, linearised.
+#[derive(Clone, Debug, Default)]
+pub struct Linearised {
+    /// Change of the displacement with each value, a column each.
+    pub columns: Vec<Vec<f64>>,
+    /// The same of what belongs to this record alone, as its offset and drift.
+    pub nuisance: Vec<Vec<f64>>,
+    /// Measured less simulated displacement, m.
+    pub residual: Vec<f64>,
+    /// Its part that is noise, m.
+    pub noise: Vec<f64>,
+    /// Weight of its squares.
+    pub weight: f64,
+}
+
+/// How sure the values of a fit are.
+#[derive(Clone, Debug)]
+pub struct Covariance {
+    /// Covariance of the values, in their units, without the directions that have no effect.
+    pub matrix: Vec<Vec<f64>>,
+    /// Whether the records determine each value.
+    pub determined: Vec<bool>,
+    /// Variance of each for independent noise.
+    pub independent: Vec<f64>,
+    /// What generalised least squares would change each value by, and the standard deviation of that.
+    pub shifts: Vec<(f64, f64)>,
+    /// Deviations of each value over their own standard deviation, sizes only, of resampled noises.
+    pub resampled: Vec<Vec<f64>>,
+    /// Order of the autoregression of each record.
+    pub orders: Vec<usize>,
+}
+
+/// A record without what belongs to it alone.
+pub(super) struct Projected {
+    /// Columns, orthogonal to the nuisance.
+    pub columns: DMatrix<f64>,
+    /// An orthonormal basis of the nuisance.
+    pub nuisance: DMatrix<f64>,
+    pub noise: Autoregression,
+    pub innovations: Vec<f64>,
+    pub weight: f64,
+}
+
+/// Returns how sure the values of a fit are.
+///
+/// `precision` is the inverse of the covariance of the values that was known besides the records, of
+/// none 0; `draws` noises are resampled.
+///
+/// # Errors
+/// [`Error::Data`] where the samples are fewer than twice the values, or the lengths differ.
+pub fn covariance(
+    records: &[Linearised],
+    precision: &[Vec<f64>],
+    draws: u32,
+    seed: u64,
+) -> Result<Covariance> {
+    let count = precision.len();
+    if precision.iter().any(|row| row.len() != count) {
+        return Err(Error::Data(
+            "precision has rows of several lengths: expected a square matrix".into(),
+        ));
+    }
+    check(records, count)?;
+    let precision = &DMatrix::from_fn(count, count, |i, j| precision[i][j]);
+    let samples: usize = records.iter().map(|one| one.residual.len()).sum();
+    let fitted = count + records.iter().map(|one| one.nuisance.len()).sum::<usize>();
+    let freedom = index(samples - fitted);
+    let projected: Vec<Projected> = records.iter().map(project).collect();
+    let variance =
+        records.iter().map(|one| one.weight * squares(&one.residual)).sum::<f64>() / freedom;
+    let noise = records.iter().map(|one| one.weight * squares(&one.noise)).sum::<f64>() / freedom;
+    let mut square = precision * variance;
+    for one in &projected {
+        square += one.columns.tr_mul(&one.columns) * one.weight;
+    }
+    let inverse = Inverse::of(&square);
+    let b = &inverse.matrix;
+    let scale = index(samples) / freedom;
+    // A prior counts like deviations of its own.
+    let mut matrix = b * (precision * (variance * variance)) * b;
+    let mut bins = Vec::with_capacity(records.len());
+    for one in &projected {
+        let spectra = Spectra::of(one, b);
+        matrix += spectra.covariance(&one.noise) * (scale * one.weight * one.weight);
+        bins.push(spectra.bins());
+    }
+    let bins = Bins::of(bins, &projected, &matrix, scale);
+    let resampled = studentised(&projected, &bins, b, scale, (draws, seed));
+    let shifts = shifts(records, &projected, precision, variance, &matrix);
+    Ok(Covariance {
+        independent: (0..count).map(|i| noise * b[(i, i)]).collect(),
+        matrix: matrix.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        determined: inverse.determined,
+        shifts,
+        resampled,
+        orders: projected.iter().map(|one| one.noise.coefficients.len()).collect(),
+    })
+}
+
+/// Refuses records from which nothing follows.
+fn check(records: &[Linearised], count: usize) -> Result<()> {
+    for one in records {
+        let n = one.residual.len();
+        let columns = one.columns.iter().chain(&one.nuisance);
+        if one.noise.len() != n
+            || one.columns.len() != count
+            || columns.into_iter().any(|c| c.len() != n)
+        {
+            return Err(Error::Data("a column has another length than the residual".into()));
+        }
+    }
+    let samples: usize = records.iter().map(|one| one.residual.len()).sum();
+    let fitted = count + records.iter().map(|one| one.nuisance.len()).sum::<usize>();
+    if samples < 2 * fitted.max(8) {
+        return Err(Error::Data(format!(
+            "{samples} samples for {fitted} values: expected {} or more",
+            2 * fitted.max(8)
+        )));
+    }
+    Ok(())
+}
+
+fn squares(values: &[f64]) -> f64 {
+    values.iter().map(|x| x * x).sum()
+}
+
+/// Takes the part of what belongs to the record alone off its columns.
+fn project(record: &Linearised) -> Projected {
+    let n = record.residual.len();
+    let of = |columns: &[Vec<f64>]| DMatrix::from_fn(n, columns.len(), |t, i| columns[i][t]);
+    let nuisance = orthonormal(of(&record.nuisance));
+    let columns = without(&nuisance, of(&record.columns));
+    let noise = Autoregression::of(&record.noise);
+    let innovations = centred(noise.innovations(&record.noise));
+    Projected { columns, nuisance, noise, innovations, weight: record.weight }
+}
+
+/// An orthonormal basis of columns, of those that are not a part of the others.
+fn orthonormal(columns: DMatrix<f64>) -> DMatrix<f64> {
+    if columns.ncols() == 0 {
+        return columns;
+    }
+    let sizes: Vec<f64> = columns.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
+    let scaled =
+        DMatrix::from_fn(columns.nrows(), columns.ncols(), |t, i| columns[(t, i)] / sizes[i]);
+    let decomposed = scaled.tr_mul(&scaled).symmetric_eigen();
+    let kept: Vec<usize> =
+        (0..sizes.len()).filter(|&k| decomposed.eigenvalues[k] > ROUNDING).collect();
+    let axes = DMatrix::from_fn(sizes.len(), kept.len(), |i, k| {
+        decomposed.eigenvectors[(i, kept[k])] / decomposed.eigenvalues[kept[k]].sqrt()
+    });
+    scaled * axes
+}
+
+/// Columns less their part in a basis.
+pub(super) fn without(basis: &DMatrix<f64>, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+    if basis.ncols() > 0 {
+        let parts = basis.tr_mul(&columns);
+        columns -= basis * parts;
+    }
+    columns
+}
+
+fn centred(mut values: Vec<f64>) -> Vec<f64> {
+    let mean = values.iter().sum::<f64>() / index(values.len().max(1));
+    for value in &mut values {
+        *value -= mean;
+    }
+    values
+}
+
+/// Inverse of normal equations, in the directions that have an effect.
+struct Inverse {
+    matrix: DMatrix<f64>,
+    determined: Vec<bool>,
+}
+
+impl Inverse {
+    fn of(square: &DMatrix<f64>) -> Self {
+        let count = square.nrows();
+        let sizes: Vec<f64> = (0..count).map(|i| square[(i, i)].max(0.0).sqrt()).collect();
+        let over = |i: usize, j: usize| {
+            let size = sizes[i] * sizes[j];
+            if size > 0.0 { square[(i, j)] / size } else { 0.0 }
+        };
+        let decomposed = DMatrix::from_fn(count, count, over).symmetric_eigen();
+        let (values, axes) = (&decomposed.eigenvalues, &decomposed.eigenvectors);
+        let seen: Vec<usize> = (0..count).filter(|&k| values[k] > ROUNDING).collect();
+        let part = |i: usize, j: usize| {
+            seen.iter().map(|&k| axes[(i, k)] * axes[(j, k)] / values[k]).sum::<f64>()
+        };
+        let matrix = DMatrix::from_fn(count, count, |i, j| {
+            let size = sizes[i] * sizes[j];
+            if size > 0.0 { part(i, j) / size } else { 0.0 }
+        });
+        let hidden = |i: usize| {
+            let length: f64 = seen.iter().map(|&k| axes[(i, k)] * axes[(i, k)]).sum();
+            1.0 - length > WITHOUT
+        };
+        let determined = (0..count).map(|i| sizes[i] > 0.0 && !hidden(i)).collect();
+        Self { matrix, determined }
+    }
+}
+
+/// Spectra of what each value takes of a noise, J B.
+struct Spectra {
+    /// Of each value, from frequency 0 to half of the sampling rate.
+    values: Vec<Vec<(f64, f64)>>,
+    size: usize,
+}
+
+impl Spectra {
+    fn of(record: &Projected, b: &DMatrix<f64>) -> Self {
+        let columns = &record.columns * b;
+        let size = (2 * columns.nrows()).next_power_of_two();
+        let pairs: Vec<usize> = (0..columns.ncols()).step_by(2).collect();
+        let column = |i: usize| columns.as_slice().chunks_exact(columns.nrows()).nth(i);
+        let transformed = on_all_threads(&pairs, &|&i| {
+            transform(column(i).unwrap_or(&[]), column(i + 1).unwrap_or(&[]), size)
+        });
+        let mut values: Vec<Vec<(f64, f64)>> = transformed.into_iter().flatten().collect();
+        values.truncate(columns.ncols());
+        Self { values, size }
+    }
+
+    /// Share of a line of the spectrum in the sum over all frequencies.
+    fn share(&self, k: usize) -> f64 {
+        let both = if k == 0 || 2 * k == self.size { 1.0 } else { 2.0 };
+        both / index(self.size)
+    }
+
+    /// Covariance of the values under a noise.
+    fn covariance(&self, noise: &Autoregression) -> DMatrix<f64> {
+        let (count, lines) = (self.values.len(), self.size / 2 + 1);
+        let parts: Vec<usize> = (0..PARTS).collect();
+        let sums = on_all_threads(&parts, &|&part| {
+            let range = lines * part / PARTS..lines * (part + 1) / PARTS;
+            let weights: Vec<f64> = range
+                .clone()
+                .map(|k| self.share(k) * noise.density(index(k) / index(self.size)))
+                .collect();
+            let mut sum = DMatrix::zeros(count, count);
+            for i in 0..count {
+                for j in 0..=i {
+                    let both =
+                        self.values[i][range.clone()].iter().zip(&self.values[j][range.clone()]);
+                    let products = both.map(|(a, b)| a.0 * b.0 + a.1 * b.1);
+                    sum[(i, j)] = products.zip(&weights).map(|(p, w)| p * w).sum::<f64>();
+                    sum[(j, i)] = sum[(i, j)];
+                }
+            }
+            sum
+        });
+        sums.into_iter().fold(DMatrix::zeros(count, count), |sum, part| sum + part)
+    }
+
+    /// Power of each value in bands of frequency: the middle of a band, and the power of each in it.
+    fn bins(&self) -> Vec<(f64, Vec<f64>)> {
+        let lines = self.size / 2 + 1;
+        let mut bins = Vec::new();
+        let mut begin = 0;
+        while begin < lines {
+            let end = (begin + 1 + begin / 64).min(lines);
+            let middle = 0.5 * (index(begin) + index(end - 1)) / index(self.size);
+            let power = |spectrum: &Vec<(f64, f64)>| {
+                (begin..end)
+                    .map(|k| {
+                        let (re, im) = spectrum[k];
+                        self.share(k) * (re * re + im * im)
+                    })
+                    .sum::<f64>()
+            };
+            bins.push((middle, self.values.iter().map(power).collect()));
+            begin = end;
+        }
+        bins
+    }
+}
+
+/// What generalised least squares would change each value by, with the standard deviation of that
+/// where the noise alone makes the difference (Hausman 1978, doi 10.2307/1913827).
+fn shifts(
+    records: &[Linearised],
+    projected: &[Projected],
+    precision: &DMatrix<f64>,
+    variance: f64,
+    matrix: &DMatrix<f64>,
+) -> Vec<(f64, f64)> {
+    let count = precision.nrows();
+    let mut square = precision * 1.0;
+    let mut slope = DVector::zeros(count);
+    for (record, one) in records.iter().zip(projected) {
+        let noise = if one.noise.variance > 0.0 { one.noise.variance } else { variance };
+        let white = |columns: &[Vec<f64>]| {
+            let columns: Vec<Vec<f64>> = columns.iter().map(|c| one.noise.innovations(c)).collect();
+            let rows = columns.first().map_or(0, Vec::len);
+            DMatrix::from_fn(rows, columns.len(), |t, i| columns[i][t])
+        };
+        let basis = orthonormal(white(&record.nuisance));
+        let columns = without(&basis, white(&record.columns));
+        let residual = DVector::from_vec(one.noise.innovations(&record.residual));
+        square += columns.tr_mul(&columns) / noise;
+        slope += columns.tr_mul(&residual) / noise;
+    }
+    let inverse = Inverse::of(&square).matrix;
+    let moved = &inverse * slope;
+    let spread = |i: usize| {
+        let difference = matrix[(i, i)] - inverse[(i, i)];
+        difference.max(LEAST * matrix[(i, i)]).max(0.0).sqrt()
+    };
+    (0..count).map(|i| (moved[i], spread(i))).collect()
+}

@@ -1,0 +1,137 @@
+"""Covariance of a fit: intervals hold for noise that is white and noise that is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from piezotrack.errors import ParameterError
+
+DT = 4e-3
+THRESHOLDS = [5.0, 15.0, 30.0]
+STAGE = pt.stages.PrandtlIshlinskiiStage(
+    linear=0.8e-6, thresholds=THRESHOLDS, weights=[0.1e-6, 0.08e-6, 0.06e-6]
+)
+METHOD = pt.LeastSquares(thresholds=THRESHOLDS, creep=False, dynamics=None, dead_zones=0)
+
+
+def nested(seconds: float = 8.0) -> np.ndarray:
+    """Sines of falling amplitude [V]."""
+    t = np.arange(0.0, seconds, DT)
+    return 40.0 + 38.0 * (1.0 - t / seconds) * np.sin(2.0 * np.pi * t)
+
+
+def correlated(rng: np.random.Generator, count: int, pole: float, size: float) -> np.ndarray:
+    """First-order autoregression of standard deviation `size`."""
+    drawn = rng.standard_normal(count + 2000) * size * np.sqrt(1.0 - pole**2)
+    noise = np.zeros(count + 2000)
+    for k in range(1, count + 2000):
+        noise[k] = pole * noise[k - 1] + drawn[k]
+    return noise[2000:]
+
+
+def coverage(u: np.ndarray, pole: float, records: int) -> tuple[float, float]:
+    """Shares of intervals of 95 % that cover, and that would if noise were independent."""
+    rng = np.random.default_rng(3)
+    clean = STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x
+    hits, without = [], []
+    truth = np.array([STAGE.linear, *STAGE.weights])
+    for _ in range(records):
+        log = pt.Dataset(u=u, y=clean + correlated(rng, u.size, pole, 50e-9), dt=DT)
+        fit = pt.identify(log, "prandtl-ishlinskii", method=METHOD, drift=False, history="virgin")
+        certainty = fit.covariance
+        intervals = np.array([certainty.interval(name) for name in certainty.names])
+        hits.append((intervals[:, 0] < truth) & (truth < intervals[:, 1]))
+        without.append(np.abs(certainty.values - truth) < 1.96 * certainty.independent)
+    return float(np.mean(hits)), float(np.mean(without))
+
+
+def test_intervals_cover_under_white_noise() -> None:
+    share, without = coverage(nested(), 0.0, 60)
+    assert 0.9 < share < 0.99
+    assert abs(share - without) < 0.03
+
+
+def test_intervals_cover_under_correlated_noise() -> None:
+    share, without = coverage(nested(), 0.95, 60)
+    assert share > 0.89
+    # What independence would say covers less than half of the time.
+    assert without < 0.55
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pole", [0.0, 0.8, 0.95])
+def test_intervals_cover_over_200_records(pole: float) -> None:
+    share, _ = coverage(nested(), pole, 200)
+    assert 0.92 < share < 0.98
+
+
+def test_what_repeats_is_model_error_and_the_rest_is_noise() -> None:
+    t = np.arange(0.0, 8.0, DT)
+    u = 40.0 - 40.0 * np.cos(2.0 * np.pi * t)
+    rng = np.random.default_rng(1)
+    missing = 30e-9 * np.sin(2.0 * np.pi * 5.0 * t)
+    y = (
+        STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x
+        + missing
+        + 20e-9 * rng.standard_normal(t.size)
+    )
+    fit = pt.identify(
+        pt.Dataset(u=u, y=y, dt=DT), "prandtl-ishlinskii", method=METHOD, history="virgin"
+    )
+    shares = fit.covariance.shares
+    assert shares.noise == pytest.approx(20e-9, rel=0.05)
+    assert shares.model_error == pytest.approx(30e-9 / np.sqrt(2.0), rel=0.1)
+
+
+def test_a_mass_without_effect_has_no_interval_and_a_prior_gives_one() -> None:
+    stage = pt.FirstOrderDahlStage(
+        mass=0.01,
+        damping=1e3,
+        piezo_coefficient=1.0,
+        stiffness=1e6,
+        rest_stiffness=2e5,
+        coulomb_force=5.0,
+    )
+    u = nested(4.0)
+    y = stage.simulate(u, DT, initial=stage.equilibrium(u[0])).x + 20e-9 * np.random.default_rng(
+        2
+    ).standard_normal(u.size)
+    log = pt.Dataset(u=u, y=y, dt=DT)
+    fit = pt.identify(log, "first-order-dahl", history="virgin")
+    for name in ("rest_stiffness", "coulomb_force"):
+        low, high = fit.covariance.interval(name, 0.999)
+        assert low < getattr(stage, name) < high
+    known = fit.covariance.deviation("coulomb_force")
+    prior = {"coulomb_force": pt.Parameter(prior=(5.0, 0.5 * known))}
+    narrowed = pt.identify(log, "first-order-dahl", history="virgin", parameters=prior)
+    expected = known * 0.5 / np.sqrt(1.0 + 0.25)
+    assert narrowed.covariance.deviation("coulomb_force") == pytest.approx(expected, rel=0.2)
+
+
+def test_several_records_determine_values_better() -> None:
+    rng = np.random.default_rng(4)
+    u = nested(4.0)
+    logs = [
+        pt.Dataset(u=u, y=STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x + noise, dt=DT)
+        for noise in 30e-9 * rng.standard_normal((4, u.size))
+    ]
+    options = {"method": METHOD, "drift": False, "history": "virgin"}
+    alone = pt.identify(logs[0], "prandtl-ishlinskii", **options)
+    all_four = pt.identify(logs, "prandtl-ishlinskii", **options)
+    ratio = all_four.covariance.deviations / alone.covariance.deviations
+    assert np.allclose(ratio, 0.5, rtol=0.25)
+
+
+def test_wrong_levels_and_names_are_refused() -> None:
+    u = nested(4.0)
+    log = pt.Dataset(u=u, y=STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x, dt=DT)
+    certainty = pt.identify(log, "prandtl-ishlinskii", method=METHOD).covariance
+    for level in (0.0, 1.0, -1.0, 95.0):
+        with pytest.raises(ParameterError) as refused:
+            certainty.interval("linear", level)
+        assert refused.value.argument == "level"
+    with pytest.raises(ParameterError) as refused:
+        certainty.deviation("mass")
+    assert refused.value.argument == "name"
