@@ -37,7 +37,7 @@ STAGES: dict[str, Any] = {
         mass=0.01,
         damping=1e3,
         stiffness=1e6,
-        piezo_coefficient=1.0,
+        piezo_coefficient=1e-6,
         alpha=0.3,
         beta=0.1,
         gamma=0.05,
@@ -65,9 +65,7 @@ def noise(rng: np.random.Generator, count: int, name: str) -> np.ndarray:
     return autoregression(rng, count, POLES[name], NOISE)
 
 
-def autoregression(
-    rng: np.random.Generator, count: int, pole: float, size: float
-) -> np.ndarray:
+def autoregression(rng: np.random.Generator, count: int, pole: float, size: float) -> np.ndarray:
     """First-order autoregression of standard deviation `size`."""
     drawn = rng.standard_normal(count + 3000) * size * np.sqrt(1.0 - pole**2)
     series = np.zeros(count + 3000)
