@@ -70,7 +70,7 @@ def test_intervals_cover_over_200_records(pole: float) -> None:
 @pytest.mark.slow
 def test_an_interval_covers_where_the_shortest_lag_was_taken() -> None:
     stage = pt.FirstOrderDahlStage(
-        mass=0.0,
+        mass=1e-3,
         damping=1e3,
         piezo_coefficient=1.0,
         stiffness=1e6,
