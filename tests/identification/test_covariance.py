@@ -67,6 +67,29 @@ def test_intervals_cover_over_200_records(pole: float) -> None:
     assert 0.92 < share < 0.98
 
 
+@pytest.mark.slow
+def test_an_interval_covers_where_the_shortest_lag_was_taken() -> None:
+    stage = pt.FirstOrderDahlStage(
+        mass=1e-3,
+        damping=1e3,
+        piezo_coefficient=1.0,
+        stiffness=1e6,
+        rest_stiffness=2e5,
+        coulomb_force=5.0,
+    )
+    u, rng = nested(), np.random.default_rng(5)
+    clean = stage.simulate(u, DT, initial=stage.equilibrium(u[0])).x
+    hits = []
+    for _ in range(30):
+        log = pt.Dataset(u=u, y=clean + correlated(rng, u.size, 0.8, 50e-9), dt=DT)
+        fit = pt.identify(log, "first-order-dahl", history="virgin")
+        assert fit.lags is not None
+        for name in fit.covariance.names:
+            low, high = fit.covariance.interval(name)
+            hits.append(low < getattr(stage, name) < high)
+    assert np.mean(hits) > 0.9
+
+
 def test_what_repeats_is_model_error_and_the_rest_is_noise() -> None:
     t = np.arange(0.0, 8.0, DT)
     u = 40.0 - 40.0 * np.cos(2.0 * np.pi * t)

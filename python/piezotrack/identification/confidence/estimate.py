@@ -133,6 +133,7 @@ def covariance_of(
         _Linear(sensitivity(model, data, values), data, weight, sizes, noise)
         for data, weight in records
     ]
+    aside = getattr(model, "lags", None) is not None
     precision = np.diag(_precision(model, values) * sizes**2).tolist()
     longest = max(record.samples for record in linear)
     short = longest <= MOST_RESAMPLED
@@ -152,10 +153,25 @@ def covariance_of(
         independent=np.sqrt(np.array(found[2])) * sizes,
         widening=np.maximum(quantiles / NormalDist().inv_cdf(0.5 + 0.5 * LEVEL), 1.0),
         shifts=np.array(found[3]) * sizes[:, None],
+        to_least_cost=sizes * (_to_least_cost(linear) if aside else 0.0),
         samples=sum(record.samples for record in linear),
         orders=tuple(found[5]),
         shares=linear[0].shares,
     )
+
+
+def _to_least_cost(records: list[_Linear]) -> Array:
+    """Gauss-Newton step from the values of a fit to the least squares."""
+    count = len(records[0].columns)
+    square, slope = np.zeros((count, count)), np.zeros(count)
+    for record in records:
+        columns, rest = record.columns.T, record.residual
+        if record.nuisance.size:
+            basis = np.linalg.qr(record.nuisance.T)[0]
+            columns = columns - basis @ (basis.T @ columns)
+        square += record.weight * (columns.T @ columns)
+        slope += record.weight * (columns.T @ rest)
+    return np.asarray(np.linalg.lstsq(square, slope, rcond=1e-10)[0])
 
 
 def _precision(model: IdentifiedModel, values: list[Value]) -> Array:

@@ -83,6 +83,9 @@ class Covariance:
     shifts : ndarray, shape (p, 2)
         What generalised least squares would change each value by, and the standard deviation of
         that difference where the noise alone makes it (Hausman 1978, doi 10.2307/1913827).
+    to_least_cost : ndarray, shape (p,)
+        Change of each value to where the cost is least, which an interval includes: not 0 where the
+        fit has the shortest lag that fits as well (`Identification.lags`).
     samples : int
         Samples of the records.
     orders : tuple of int
@@ -116,6 +119,7 @@ class Covariance:
     independent: Array
     widening: Array
     shifts: Array
+    to_least_cost: Array
     samples: int
     orders: tuple[int, ...]
     shares: NoiseShares | None = None
@@ -198,8 +202,8 @@ class Covariance:
         """
         place = self._place(name)
         reach = float(self.widening[place] * _normal(level) * self.deviations[place])
-        value = float(self.values[place])
-        return Interval(value - reach, value + reach)
+        ends = float(self.values[place]) + np.array([0.0, self.to_least_cost[place]])
+        return Interval(float(ends.min()) - reach, float(ends.max()) + reach)
 
     def reach(self, gradient: Array, level: float = 0.95) -> float:
         """Return half of the interval of a quantity that follows from the values.
@@ -227,7 +231,8 @@ class Covariance:
             return math.inf
         whole = float(variances.sum())
         widening = float(variances @ self.widening) / whole if whole > 0.0 else 1.0
-        return normal * widening * math.sqrt(max(float(gradient @ self.matrix @ gradient), 0.0))
+        deviation = math.sqrt(max(float(gradient @ self.matrix @ gradient), 0.0))
+        return normal * widening * deviation + abs(float(gradient @ self.to_least_cost))
 
     def _place(self, name: str) -> int:
         if name not in self.names:

@@ -231,10 +231,10 @@ def verdict_sentences(fit: Identification) -> list[str]:
     Returns
     -------
     list of str
-        Sentences; none after least squares.
+        Sentences; after least squares only what no interval covers.
     """
     if not fit.parameters:
-        return []
+        return [one for one in _certainty(fit) if one]
     known, _ = determined(fit)
     values = ", ".join(f"{symbol} = {value:.6g} {unit}".rstrip() for symbol, value, unit in known)
     lines = [f"The data determine {values or 'no parameter'}."]
