@@ -202,10 +202,11 @@ def residual_of(fit: Identification, record: int = 0) -> Residual:
     Each ingredient that the model may lack, as creep or a mode, is fitted to the residual as a
     group of regressors, with all that the parameters of the model and a symmetric loop of another
     shape can do. A cause is named where it explains at least 15 % of the squared residual beyond
-    that, and a fifth of what is not noise; or half of this alone, and half of what the loop leaves.
-    Its criterion (Schwarz 1978, doi 10.1214/aos/1176344136) is the lowest by 10 or more, and what
-    it explains is more by 2 %, or by what it leaves unexplained itself. A mode that explains no
-    more than a delay is taken for one.
+    that, and a fifth of what is not noise; or half of this alone, and half of what the loop leaves;
+    and where that or what it explains alone is more than the loop does. Its criterion (Schwarz
+    1978, doi 10.1214/aos/1176344136) is the lowest by 10 or more, and what it explains is more by
+    2 %, or by what it leaves unexplained itself. A mode that explains no more than a delay is taken
+    for one.
 
     Parameters
     ----------
@@ -342,6 +343,8 @@ def _explained(result: Residual, fit: Identification, record: int) -> Residual:
     explains = first.gain > max(WORTH, SHARE * systematic) or (
         first.alone > ALONE * systematic and first.gain > ALONE * (systematic - shape)
     )
+    # A loop of another shape that explains more is not named for what is left besides.
+    explains = explains and max(first.gain, first.alone) > shape
     others = [name for name in order if name not in alike]
     return replace(
         result,
