@@ -37,7 +37,7 @@ PLAYS, SAMPLES, BENDS = 28, 60, 1.3
 
 
 class Explained(NamedTuple):
-    """What one more group of regressors explains of a residual.
+    """Part of a residual that one more group of regressors explains.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a model file knows of the record that it was identified from."""
+"""The record that a model was identified from, as far as its file has it."""
 
 from __future__ import annotations
 

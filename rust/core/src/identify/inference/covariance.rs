@@ -50,7 +50,7 @@ pub struct Covariance {
     pub determined: Vec<bool>,
     /// Variance of each for independent noise.
     pub independent: Vec<f64>,
-    /// What generalised least squares would change each value by, and the standard deviation of that.
+    /// Change of each value by generalised least squares, and the standard deviation of that.
     pub shifts: Vec<(f64, f64)>,
     /// Deviations of each value over their own standard deviation, sizes only, of resampled noises.
     pub resampled: Vec<Vec<f64>>,
@@ -305,7 +305,7 @@ impl Spectra {
     }
 }
 
-/// What generalised least squares would change each value by, with the standard deviation of that
+/// Change of each value by generalised least squares, with the standard deviation of that
 /// where the noise alone makes the difference (Hausman 1978, doi 10.2307/1913827).
 fn shifts(
     records: &[Linearised],
