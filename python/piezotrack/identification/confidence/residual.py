@@ -236,7 +236,7 @@ def residual_of(fit: Identification, record: int = 0) -> Residual:
     >>> t = np.arange(3000) / 200.0
     >>> u = 40.0 - 40.0 * np.exp(-0.1 * t) * np.cos(2.0 * np.pi * t)
     >>> y = stage.simulate(u, 0.005).x + 20e-9 * np.random.default_rng(1).normal(size=t.size)
-    >>> plays = pt.LeastSquares(creep=False, dynamics=None)
+    >>> plays = pt.LeastSquares(creep=False, dynamics=None, dead_zones=False)
     >>> fit = pt.identify(
     ...     pt.Dataset(u=u, y=y, dt=0.005), "prandtl-ishlinskii", method=plays, drift=False
     ... )
