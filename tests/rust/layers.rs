@@ -23,7 +23,7 @@ const CORE: [&str; 10] = [
 ];
 
 /// The rooms of `identify`, from the bottom up.
-const IDENTIFY: [&str; 10] = [
+const IDENTIFY: [&str; 11] = [
     "swarm",
     "records",
     "parameters",
@@ -33,6 +33,7 @@ const IDENTIFY: [&str; 10] = [
     "descent",
     "search",
     "experiments",
+    "inference",
     "identification",
 ];
 

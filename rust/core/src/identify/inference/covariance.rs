@@ -9,13 +9,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::autoregression::Autoregression;
 use super::fourier::transform;
+use super::linearised::{Linearised, Projected, ROUNDING, orthonormal, project, without};
 use super::resampling::{Bins, studentised};
 use crate::error::{Error, Result};
 use crate::math::on_all_threads;
 use crate::signal::index;
-
-/// Share of an eigenvalue below which its direction does not change the displacement.
-const ROUNDING: f64 = 1e-10;
 
 /// Share of a value's direction without effect from which on it is not determined.
 const WITHOUT: f64 = 1e-6;
@@ -25,21 +23,6 @@ const PARTS: usize = 16;
 
 /// Least share of the variance that the difference of two estimates has, for rounding.
 const LEAST: f64 = 1e-4;
-
-/// A record about a fit, linearised.
-#[derive(Clone, Debug, Default)]
-pub struct Linearised {
-    /// Change of the displacement with each value, a column each.
-    pub columns: Vec<Vec<f64>>,
-    /// The same of what belongs to this record alone, as its offset and drift.
-    pub nuisance: Vec<Vec<f64>>,
-    /// Measured less simulated displacement, m.
-    pub residual: Vec<f64>,
-    /// Its part that is noise, m.
-    pub noise: Vec<f64>,
-    /// Weight of its squares.
-    pub weight: f64,
-}
 
 /// How sure the values of a fit are.
 #[derive(Clone, Debug)]
@@ -56,17 +39,6 @@ pub struct Covariance {
     pub resampled: Vec<Vec<f64>>,
     /// Order of the autoregression of each record.
     pub orders: Vec<usize>,
-}
-
-/// A record without what belongs to it alone.
-pub(super) struct Projected {
-    /// Columns, orthogonal to the nuisance.
-    pub columns: DMatrix<f64>,
-    /// An orthonormal basis of the nuisance.
-    pub nuisance: DMatrix<f64>,
-    pub noise: Autoregression,
-    pub innovations: Vec<f64>,
-    pub weight: f64,
 }
 
 /// Returns how sure the values of a fit are.
@@ -150,51 +122,6 @@ fn check(records: &[Linearised], count: usize) -> Result<()> {
 
 fn squares(values: &[f64]) -> f64 {
     values.iter().map(|x| x * x).sum()
-}
-
-/// Takes the part of what belongs to the record alone off its columns.
-fn project(record: &Linearised) -> Projected {
-    let n = record.residual.len();
-    let of = |columns: &[Vec<f64>]| DMatrix::from_fn(n, columns.len(), |t, i| columns[i][t]);
-    let nuisance = orthonormal(of(&record.nuisance));
-    let columns = without(&nuisance, of(&record.columns));
-    let noise = Autoregression::of(&record.noise);
-    let innovations = centred(noise.innovations(&record.noise));
-    Projected { columns, nuisance, noise, innovations, weight: record.weight }
-}
-
-/// An orthonormal basis of columns, of those that are not a part of the others.
-fn orthonormal(columns: DMatrix<f64>) -> DMatrix<f64> {
-    if columns.ncols() == 0 {
-        return columns;
-    }
-    let sizes: Vec<f64> = columns.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
-    let scaled =
-        DMatrix::from_fn(columns.nrows(), columns.ncols(), |t, i| columns[(t, i)] / sizes[i]);
-    let decomposed = scaled.tr_mul(&scaled).symmetric_eigen();
-    let kept: Vec<usize> =
-        (0..sizes.len()).filter(|&k| decomposed.eigenvalues[k] > ROUNDING).collect();
-    let axes = DMatrix::from_fn(sizes.len(), kept.len(), |i, k| {
-        decomposed.eigenvectors[(i, kept[k])] / decomposed.eigenvalues[kept[k]].sqrt()
-    });
-    scaled * axes
-}
-
-/// Columns less their part in a basis.
-pub(super) fn without(basis: &DMatrix<f64>, mut columns: DMatrix<f64>) -> DMatrix<f64> {
-    if basis.ncols() > 0 {
-        let parts = basis.tr_mul(&columns);
-        columns -= basis * parts;
-    }
-    columns
-}
-
-fn centred(mut values: Vec<f64>) -> Vec<f64> {
-    let mean = values.iter().sum::<f64>() / index(values.len().max(1));
-    for value in &mut values {
-        *value -= mean;
-    }
-    values
 }
 
 /// Inverse of normal equations, in the directions that have an effect.
@@ -337,4 +264,34 @@ fn shifts(
         difference.max(LEAST * matrix[(i, i)]).max(0.0).sqrt()
     };
     (0..count).map(|i| (moved[i], spread(i))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::linearised::Linearised;
+    use super::covariance;
+    use crate::math::Draws;
+    use crate::signal::index;
+
+    #[test]
+    fn white_noise_has_the_errors_of_the_textbook() -> crate::Result<()> {
+        let n = 2000;
+        let t: Vec<f64> = (0..n).map(|k| index(k) / index(n)).collect();
+        let noise: Vec<f64> = (0..n).map(|k| Draws::normal(7, k as u64)).collect();
+        let mean = noise.iter().sum::<f64>() / index(n);
+        let record = Linearised {
+            columns: vec![t.iter().map(|t| t - 0.5).collect()],
+            nuisance: vec![vec![1.0; n]],
+            residual: noise.iter().map(|x| x - mean).collect(),
+            noise: noise.iter().map(|x| x - mean).collect(),
+            weight: 1.0,
+        };
+        let found = covariance(&[record], &[vec![0.0]], 199, 1)?;
+        // Variance of a slope: s^2 / sum (t - mean)^2 = 12 s^2 / n.
+        assert!((found.matrix[0][0] * index(n) / 12.0 - 1.0).abs() < 0.15);
+        let mut sizes: Vec<f64> = found.resampled.iter().map(|row| row[0]).collect();
+        sizes.sort_by(f64::total_cmp);
+        assert!((1.6..2.4).contains(&sizes[189]));
+        Ok(())
+    }
 }

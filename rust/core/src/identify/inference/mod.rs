@@ -3,6 +3,8 @@
 mod autoregression;
 mod covariance;
 mod fourier;
+mod linearised;
 mod resampling;
 
-pub use covariance::{Covariance, Linearised, covariance};
+pub use covariance::{Covariance, covariance};
+pub use linearised::Linearised;

@@ -7,7 +7,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::autoregression::Autoregression;
-use super::covariance::Projected;
+use super::linearised::Projected;
 use crate::math::{Draws, on_all_threads};
 
 /// Samples of a noise before the record, most.
@@ -104,33 +104,4 @@ fn resampled(record: &Projected, scale: f64, stream: &mut Draws) -> DVector<f64>
     let drawn: Vec<f64> =
         (0..count + leading).map(|_| size * known[stream.below(known.len())]).collect();
     DVector::from_vec(record.noise.noise(&drawn, leading))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::covariance::{Linearised, covariance};
-    use crate::math::Draws;
-    use crate::signal::index;
-
-    #[test]
-    fn white_noise_has_the_errors_of_the_textbook() -> crate::Result<()> {
-        let n = 2000;
-        let t: Vec<f64> = (0..n).map(|k| index(k) / index(n)).collect();
-        let noise: Vec<f64> = (0..n).map(|k| Draws::normal(7, k as u64)).collect();
-        let mean = noise.iter().sum::<f64>() / index(n);
-        let record = Linearised {
-            columns: vec![t.iter().map(|t| t - 0.5).collect()],
-            nuisance: vec![vec![1.0; n]],
-            residual: noise.iter().map(|x| x - mean).collect(),
-            noise: noise.iter().map(|x| x - mean).collect(),
-            weight: 1.0,
-        };
-        let found = covariance(&[record], &[vec![0.0]], 199, 1)?;
-        // Variance of a slope: s^2 / sum (t - mean)^2 = 12 s^2 / n.
-        assert!((found.matrix[0][0] * index(n) / 12.0 - 1.0).abs() < 0.15);
-        let mut sizes: Vec<f64> = found.resampled.iter().map(|row| row[0]).collect();
-        sizes.sort_by(f64::total_cmp);
-        assert!((1.6..2.4).contains(&sizes[189]));
-        Ok(())
-    }
 }
