@@ -268,8 +268,7 @@ fn shifts(
 
 #[cfg(test)]
 mod tests {
-    use super::super::linearised::Linearised;
-    use super::covariance;
+    use super::{Linearised, covariance};
     use crate::math::Draws;
     use crate::signal::index;
 
