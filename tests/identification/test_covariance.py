@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pytest
 
 import piezotrack as pt
 from piezotrack.errors import ParameterError
 
+if TYPE_CHECKING:
+    from piezotrack.identification.fitted.covariance import Covariance
+
 DT = 4e-3
-THRESHOLDS = [5.0, 15.0, 30.0]
+THRESHOLDS = (5.0, 15.0, 30.0)
 STAGE = pt.stages.PrandtlIshlinskiiStage(
-    linear=0.8e-6, thresholds=THRESHOLDS, weights=[0.1e-6, 0.08e-6, 0.06e-6]
+    linear=0.8e-6, thresholds=THRESHOLDS, weights=(0.1e-6, 0.08e-6, 0.06e-6)
 )
 METHOD = pt.LeastSquares(thresholds=THRESHOLDS, creep=False, dynamics=None, dead_zones=0)
+
+
+def certainty_of(fit: pt.identification.Identification) -> Covariance:
+    assert fit.covariance is not None
+    return fit.covariance
 
 
 def nested(seconds: float = 8.0) -> np.ndarray:
@@ -40,7 +50,7 @@ def coverage(u: np.ndarray, pole: float, records: int) -> tuple[float, float]:
     for _ in range(records):
         log = pt.Dataset(u=u, y=clean + correlated(rng, u.size, pole, 50e-9), dt=DT)
         fit = pt.identify(log, "prandtl-ishlinskii", method=METHOD, drift=False, history="virgin")
-        certainty = fit.covariance
+        certainty = certainty_of(fit)
         intervals = np.array([certainty.interval(name) for name in certainty.names])
         hits.append((intervals[:, 0] < truth) & (truth < intervals[:, 1]))
         without.append(np.abs(certainty.values - truth) < 1.96 * certainty.independent)
@@ -84,8 +94,8 @@ def test_an_interval_covers_where_the_shortest_lag_was_taken() -> None:
         log = pt.Dataset(u=u, y=clean + correlated(rng, u.size, 0.8, 50e-9), dt=DT)
         fit = pt.identify(log, "first-order-dahl", history="virgin")
         assert fit.lags is not None
-        for name in fit.covariance.names:
-            low, high = fit.covariance.interval(name)
+        for name in certainty_of(fit).names:
+            low, high = certainty_of(fit).interval(name)
             hits.append(low < getattr(stage, name) < high)
     assert np.mean(hits) > 0.9
 
@@ -103,7 +113,8 @@ def test_what_repeats_is_model_error_and_the_rest_is_noise() -> None:
     fit = pt.identify(
         pt.Dataset(u=u, y=y, dt=DT), "prandtl-ishlinskii", method=METHOD, history="virgin"
     )
-    shares = fit.covariance.shares
+    shares = certainty_of(fit).shares
+    assert shares is not None
     assert shares.noise == pytest.approx(20e-9, rel=0.05)
     assert shares.model_error == pytest.approx(30e-9 / np.sqrt(2.0), rel=0.1)
 
@@ -124,13 +135,13 @@ def test_a_mass_without_effect_has_no_interval_and_a_prior_gives_one() -> None:
     log = pt.Dataset(u=u, y=y, dt=DT)
     fit = pt.identify(log, "first-order-dahl", history="virgin")
     for name in ("rest_stiffness", "coulomb_force"):
-        low, high = fit.covariance.interval(name, 0.999)
+        low, high = certainty_of(fit).interval(name, 0.999)
         assert low < getattr(stage, name) < high
-    known = fit.covariance.deviation("coulomb_force")
+    known = certainty_of(fit).deviation("coulomb_force")
     prior = {"coulomb_force": pt.Parameter(prior=(5.0, 0.5 * known))}
     narrowed = pt.identify(log, "first-order-dahl", history="virgin", parameters=prior)
     expected = known * 0.5 / np.sqrt(1.0 + 0.25)
-    assert narrowed.covariance.deviation("coulomb_force") == pytest.approx(expected, rel=0.2)
+    assert certainty_of(narrowed).deviation("coulomb_force") == pytest.approx(expected, rel=0.2)
 
 
 def test_several_records_determine_values_better() -> None:
@@ -140,17 +151,17 @@ def test_several_records_determine_values_better() -> None:
         pt.Dataset(u=u, y=STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x + noise, dt=DT)
         for noise in 30e-9 * rng.standard_normal((4, u.size))
     ]
-    options = {"method": METHOD, "drift": False, "history": "virgin"}
+    options: dict[str, Any] = {"method": METHOD, "drift": False, "history": "virgin"}
     alone = pt.identify(logs[0], "prandtl-ishlinskii", **options)
     all_four = pt.identify(logs, "prandtl-ishlinskii", **options)
-    ratio = all_four.covariance.deviations / alone.covariance.deviations
+    ratio = certainty_of(all_four).deviations / certainty_of(alone).deviations
     assert np.allclose(ratio, 0.5, rtol=0.25)
 
 
 def test_wrong_levels_and_names_are_refused() -> None:
     u = nested(4.0)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x, dt=DT)
-    certainty = pt.identify(log, "prandtl-ishlinskii", method=METHOD).covariance
+    certainty = certainty_of(pt.identify(log, "prandtl-ishlinskii", method=METHOD))
     for level in (0.0, 1.0, -1.0, 95.0):
         with pytest.raises(ParameterError) as refused:
             certainty.interval("linear", level)

@@ -60,6 +60,7 @@ def test_a_model_that_is_not_exact_spreads_further_than_its_noise_says() -> None
     log = record(1)
     fit = fitted(log)
     certainty = fit.covariance
+    assert certainty is not None
     independent = certainty.independent[certainty.names.index("piezo_coefficient")]
     found = spread(posterior_models(fit, log, deviations=1.0), "piezo_coefficient")
     assert found > 2.0 * independent

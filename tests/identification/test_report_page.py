@@ -39,7 +39,11 @@ def plays() -> pt.identification.Identification:
 @cache
 def dahl() -> pt.identification.Identification:
     few = pt.Descents(samples=4, starts=2, agreeing=2, rounds=1, seed=3)
-    held = {"stiffness": 2e5, "a1": (100.0, 1e4), "b0": pt.Parameter(prior=(0.0, 1.0))}
+    held: dict[str, Any] = {
+        "stiffness": 2e5,
+        "a1": (100.0, 1e4),
+        "b0": pt.Parameter(prior=(0.0, 1.0)),
+    }
     return pt.identify(
         LOG[3.0:5.0], "dahl", parameters=held, constraints=["a1 < a2"], delay=1e-4, method=few,
         progress=False,
@@ -157,8 +161,10 @@ def test_the_interval_is_that_of_the_covariance() -> None:
         if section.title == "Parameters"
     )
     rows = {row[1]: row for row in table.rows}  # type: ignore[union-attr]
+    covariance = dahl().covariance
+    assert covariance is not None
     interval = tuple(map(float, str(rows["D"][3]).split(" to ")))
-    assert interval == pytest.approx(dahl().covariance.interval("damping"), rel=1e-3)
+    assert interval == pytest.approx(covariance.interval("damping"), rel=1e-3)
     assert rows["K"][3] == ""
 
 
@@ -184,7 +190,7 @@ def test_another_ending_is_refused(name: str, tmp_path: Path) -> None:
 def test_other_bad_arguments_are_refused(tmp_path: Path) -> None:
     for argument in ({"controller": 3}, {"suggestion": plays}, {"date": "2020-02-29"}):
         with pytest.raises(ParameterError, match=next(iter(argument))):
-            plays().report(tmp_path / "report.html", **argument)  # type: ignore[arg-type]
+            plays().report(tmp_path / "report.html", **argument)
     with pytest.raises(DataError, match="cannot be written"):
         plays().report(tmp_path / "missing" / "report.html")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -32,30 +32,32 @@ PLAYS = pt.LeastSquares(creep=False, dynamics=None, dead_zones=False)
 def drive_of(kind: str, rng: np.random.Generator) -> Array:
     if kind == "decaying":
         decay = np.exp(-rng.uniform(0.5, 1.5) * T / LENGTH)
-        return 50.0 - 50.0 * decay * np.cos(2.0 * np.pi * rng.integers(8, 20) * T / LENGTH)
+        turned = np.cos(2.0 * np.pi * rng.integers(8, 20) * T / LENGTH)
+        return np.asarray(50.0 - 50.0 * decay * turned)
     if kind == "chirp":
-        return 50.0 - 45.0 * np.cos(2.0 * np.pi * (2.0 * T + 14.0 * T**2 / LENGTH) / LENGTH)
+        phase = 2.0 * np.pi * (2.0 * T + 14.0 * T**2 / LENGTH) / LENGTH
+        return np.asarray(50.0 - 45.0 * np.cos(phase))
     if kind == "triangles":
         ends = 50.0 + 50.0 * np.linspace(1.0, 0.3, 12) * np.tile([1.0, -1.0], 6)
-        return np.interp(T, np.linspace(0.0, LENGTH, 13), [0.0, *ends])
+        return np.asarray(np.interp(T, np.linspace(0.0, LENGTH, 13), [0.0, *ends]))
     waves = [
         rng.normal() * np.cos(2.0 * np.pi * k * T / LENGTH + rng.uniform(0.0, 6.0)) / k**0.5
         for k in (2, 3, 5, 9, 14, 23)
     ]
     total = np.sum(waves, axis=0)
-    return 100.0 * (total - total.min()) / np.ptp(total)
+    return np.asarray(100.0 * (total - total.min()) / np.ptp(total))
 
 
 def log_of(cause: str | None, kind: str, seed: int) -> pt.Dataset:
     """Record a stage of plays with one more ingredient, and white noise."""
     rng = np.random.default_rng([seed, 0 if cause is None else 1 + CAUSES.index(cause)])
     u = drive_of(kind, rng)
-    parts = {
+    parts: dict[str, Any] = {
         "linear": 0.8e-6,
         "thresholds": tuple(np.sort(rng.uniform(1.0, 45.0, 16))),
         "weights": tuple(rng.uniform(5e-9, 4e-8, 16)),
     }
-    stage: pt.stages.Stage = pt.PrandtlIshlinskiiStage(**parts)
+    stage: Any = pt.PrandtlIshlinskiiStage(**parts)
     if cause == "creep":
         times = float(np.exp(rng.uniform(np.log(LENGTH / 30.0), np.log(LENGTH / 3.0))))
         stage = replace(stage, creep_times=(times,), creep_weights=(rng.uniform(0.03, 0.1),))
@@ -193,7 +195,7 @@ def test_the_record_is_one_of_the_fit() -> None:
     with pytest.raises(pt.ParameterError, match="record"):
         residual_of(fit, 1)
     with pytest.raises(pt.ParameterError, match="fit"):
-        residual_of(fit.model)  # type: ignore[arg-type]
+        residual_of(fit.model)
 
 
 def test_readings_left_out_and_records_held_between_samples_are_judged() -> None:

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 NOISE, SLEW, DT, SECONDS = 2e-9, 2000.0, 2e-3, 2.0
-MECHANICS = {"mass": 0.05, "damping": 30.0, "stiffness": 5e4}
+MECHANICS: dict[str, Any] = {"mass": 0.05, "damping": 30.0, "stiffness": 5e4}
 PLAYS = pt.PrandtlIshlinskiiStage(
     linear=0.8e-6,
-    thresholds=[5.0, 15.0, 30.0],
-    weights=[0.15e-6, 0.1e-6, 0.08e-6],
-    creep_weights=[0.02, 0.02],
-    creep_times=[0.2, 2.0],
+    thresholds=(5.0, 15.0, 30.0),
+    weights=(0.15e-6, 0.1e-6, 0.08e-6),
+    creep_weights=(0.02, 0.02),
+    creep_times=(0.2, 2.0),
     time_constant=4e-3,
 )
 STAGES: dict[str, Any] = {
@@ -77,7 +77,7 @@ def obtained(stage: Any, names: list[str], u: Array, seeds: int) -> Array:
 
         start = np.ones(len(names))
         fits.append(least_squares(residual, start, method="lm", diff_step=1e-4).x)
-    return np.std(fits, axis=0, ddof=1)
+    return np.asarray(np.std(fits, axis=0, ddof=1))
 
 
 def multisine(drive: SuggestedDrive) -> Array:
@@ -167,7 +167,7 @@ def test_a_fit_is_compared_with_its_record_whose_slow_sine_shows_no_lag() -> Non
     log = pt.VirtualStage.of(PLAYS, noise=NOISE, seed=1).record(
         37.5 - 37.5 * np.cos(2.0 * np.pi * 0.5 * t), DT
     )
-    method = pt.LeastSquares(thresholds=[5.0, 15.0, 30.0], creep=[0.2, 2.0], dynamics="first")
+    method = pt.LeastSquares(thresholds=(5.0, 15.0, 30.0), creep=[0.2, 2.0], dynamics="first")
     fit = pt.identify(log, "prandtl-ishlinskii", method=method)
     drive = suggested(fit, noise=None, limits=(0.0, 90.0), seconds=1.0)
     assert drive.noise == pytest.approx(NOISE, rel=0.1)

@@ -132,6 +132,7 @@ def test_standard_deviations_account_for_correlated_residuals(r: float) -> None:
     # Of a value that shows slowly the deviation is so many times that for independent noise
     # (Bartlett 1935, doi 10.2307/2342284).
     factor = ((1.0 + r) / (1.0 - r)) ** 0.5
+    assert fit.covariance is not None
     widened = fit.covariance.deviations / fit.covariance.independent
     assert widened[fit.covariance.names.index("piezo_coefficient")] == pytest.approx(
         factor, rel=0.2

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # Changes, what they are of the stage or of the record, and what is to be read.
 WIDER = replace(STAGE, weights=tuple(1.15 * one for one in STAGE.weights))
-LOWER = replace(STAGE, frequency=0.95 * STAGE.frequency)
+LOWER = replace(STAGE, frequency=0.95 * (STAGE.frequency or 0.0))
 CHANGES: dict[str, tuple[dict[str, Any], float, float]] = {
     "gain": ({"gain": 1.02}, 0.02, 0.001),
     "hysteresis": ({"stage": WIDER}, 0.15, 0.015),
@@ -158,7 +158,10 @@ def test_the_rates_of_false_alarms_and_of_hits() -> None:
     for seed in range(100):
         correlation = SLOW * (seed % 2)
         model = model_watched(1000 + seed, correlation)
-        given = {"samples": int(draw.integers(2500, 6000)), "top": float(draw.uniform(45.0, 75.0))}
+        given: dict[str, Any] = {
+            "samples": int(draw.integers(2500, 6000)),
+            "top": float(draw.uniform(45.0, 75.0)),
+        }
         record = watched(2000 + seed, correlation=correlation, **given)
         if judged == 60 or model.extrapolation_notes(record.u, DT):
             # Faster than the model allows: refused.
