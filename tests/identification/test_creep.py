@@ -270,4 +270,4 @@ def test_a_model_file_keeps_it_and_older_ones_have_none(tmp_path: Path) -> None:
 
 def test_the_summary_lists_it() -> None:
     assert "creep_weights c" in with_creep(0.3, 4.0).summary()
-    assert "creep" not in with_creep().summary()
+    assert "creep_weights" not in with_creep().summary()

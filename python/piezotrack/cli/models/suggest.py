@@ -33,7 +33,7 @@ def suggest_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Suggest the drive whose record would determine a model best.
+    """Suggest the drive that would determine a model best.
 
     It is written as a table that `piezotrack measure` plays, with the deviations of the parameters
     to expect.

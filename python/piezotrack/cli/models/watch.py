@@ -38,7 +38,7 @@ def watch_command(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Judge from a new log whether a stage is still that of its model.
+    """Judge from a new log whether a stage has changed.
 
     The exit code is 0 if nothing has changed as far as the log shows, 3 if something has, and 2 if
     the log cannot be judged.

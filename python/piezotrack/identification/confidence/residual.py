@@ -140,6 +140,8 @@ class Residual(Result):
         Share of the squared residual that a symmetric loop of another shape explains.
     likely : int
         How many of the candidates cannot be distinguished; 0 where none explains the residual.
+    correlations : ndarray, shape (m,)
+        Autocorrelations of the residual, from a lag of one sample on.
     """
 
     views: ClassVar[Mapping[str, str]] = {

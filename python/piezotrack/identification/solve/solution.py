@@ -60,5 +60,8 @@ def _with_arguments(fit: Identification, problem: Problem) -> Identification:
         given["records"] = records
     if not given:
         return fit
+    if isinstance(known := given.get("parameters"), dict):
+        # The order in which they were given changes nothing.
+        given["parameters"] = dict(sorted(known.items()))
     origin = {**fit.details["provenance"], "arguments": given}
     return replace(fit, details={**fit.details, "provenance": origin})
