@@ -37,6 +37,7 @@ __all__ = [
     "as_count",
     "as_number",
     "as_truth",
+    "autoregression",
     "check_loop",
     "check_margins",
     "check_part",
@@ -486,6 +487,7 @@ def path_errors(
     x: ArrayLike, y: ArrayLike, path_x: ArrayLike, path_y: ArrayLike
 ) -> NDArray[np.float64]: ...
 def spread(errors: ArrayLike) -> _Spread: ...
+def autoregression(noise: ArrayLike) -> tuple[list[float], float]: ...
 def linearised_covariance(
     records: Sequence[
         tuple[
@@ -504,6 +506,7 @@ def linearised_covariance(
     list[bool],
     list[float],
     list[tuple[float, float]],
+    list[float],
     list[list[float]],
     list[int],
 ]: ...

@@ -12,8 +12,9 @@ import numpy as np
 from ... import _core
 from ...errors import DataError, PiezotrackError
 from ..fitted.covariance import Covariance, NoiseShares
+from ..solve.search import details_of
 from ..solve.selection import period_of
-from .sensitivity import DELAY, Value, fitted_values, moved, sensitivity
+from .sensitivity import DELAY, Value, fitted_values, gradient, sensitivity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,16 +63,10 @@ def with_covariance(fit: Identification) -> Identification:
         for name, estimate in fit.parameters.items()
     }
     entries = dict(fit.details.get("parameters", {}))
-    for name, estimate in parameters.items():
-        if name in entries:
-            known = estimate.deviation is not None and math.isfinite(estimate.deviation)
-            deviation = estimate.deviation if known else None
-            entries[name] = {**entries[name], "standard_deviation": deviation}
+    entries |= {name: details_of(parameters[name]) for name in set(entries) & set(parameters)}
     details: dict[str, Any] = {**fit.details, "parameters": entries}
-    if DELAY in parameters and fit.details.get(DELAY):
-        deviation = parameters[DELAY].deviation
-        known = deviation is not None and math.isfinite(deviation)
-        details[DELAY] = {**fit.details[DELAY], "standard_deviation": deviation if known else None}
+    if DELAY in parameters:
+        details[DELAY] = details_of(parameters[DELAY])
     return replace(fit, covariance=covariance, parameters=parameters, details=details)
 
 
@@ -82,20 +77,9 @@ def _deviation(
     if covariance is not None and name in covariance.names:
         return covariance.deviation(name)
     if estimate.tie is not None and covariance is not None:
-        return covariance.reach(_gradient(fit, name), level=0.6826894921370859)
+        return covariance.reach(gradient(fit, Value(name).of), level=0.6826894921370859)
     # On a bound, and of what belongs to a record, for independent residuals.
     return estimate.deviation
-
-
-def _gradient(fit: Identification, name: str) -> Array:
-    """Change of a tied parameter with each value."""
-    values, slopes = fitted_values(fit), []
-    for value in values:
-        size = 1e-4 * abs(value.of(fit))
-        ends = [moved(fit, [value], np.array([way * size])) for way in (1.0, -1.0)]
-        up, down = (math.nan if one is None else Value(name).of(one) for one in ends)
-        slopes.append((up - down) / (2.0 * size) if size else 0.0)
-    return np.asarray(np.nan_to_num(np.array(slopes, dtype=np.float64)))
 
 
 def covariance_of(
@@ -138,41 +122,26 @@ def covariance_of(
     precision = np.diag(_precision(model, values) * sizes**2).tolist()
     longest = max(record.samples for record in linear)
     short = longest <= MOST_RESAMPLED
-    found = _core.linearised_covariance(
+    rows, determined, independent, shifts, steps, resampled, orders = _core.linearised_covariance(
         [record.thinned(MOST) for record in linear], precision, DRAWS if short else 0, SEED
     )
-    resampled = found[4]
     if not short:
         few = [record.thinned(MOST_RESAMPLED) for record in linear]
-        resampled = _core.linearised_covariance(few, precision, DRAWS, SEED)[4]
+        *_, resampled, _ = _core.linearised_covariance(few, precision, DRAWS, SEED)
     quantiles = np.quantile(np.array(resampled), LEVEL, axis=0)
     return Covariance(
         names=tuple(str(value) for value in values),
         values=np.array([value.of(model) for value in values]),
-        matrix=np.array(found[0]) * np.outer(sizes, sizes),
-        determined=np.array(found[1]),
-        independent=np.sqrt(np.array(found[2])) * sizes,
+        matrix=np.array(rows) * np.outer(sizes, sizes),
+        determined=np.array(determined),
+        independent=np.sqrt(np.array(independent)) * sizes,
         widening=np.maximum(quantiles / NormalDist().inv_cdf(0.5 + 0.5 * LEVEL), 1.0),
-        shifts=np.array(found[3]) * sizes[:, None],
-        to_least_cost=sizes * (_to_least_cost(linear) if aside else 0.0),
+        shifts=np.array(shifts) * sizes[:, None],
+        to_least_cost=sizes * (np.array(steps) if aside else 0.0),
         samples=sum(record.samples for record in linear),
-        orders=tuple(found[5]),
+        orders=tuple(orders),
         shares=linear[0].shares,
     )
-
-
-def _to_least_cost(records: list[_Linear]) -> Array:
-    """Gauss-Newton step from the values of a fit to the least squares."""
-    count = len(records[0].columns)
-    square, slope = np.zeros((count, count)), np.zeros(count)
-    for record in records:
-        columns, rest = record.columns.T, record.residual
-        if record.nuisance.size:
-            basis = np.linalg.qr(record.nuisance.T)[0]
-            columns = columns - basis @ (basis.T @ columns)
-        square += record.weight * (columns.T @ columns)
-        slope += record.weight * (columns.T @ rest)
-    return np.asarray(np.linalg.lstsq(square, slope, rcond=1e-10)[0])
 
 
 def _precision(model: IdentifiedModel, values: list[Value]) -> Array:

@@ -13,7 +13,7 @@ from ..fitted.identified_model import IdentifiedModel
 from ..fitted.start import same_beginning, start_after, start_at_jump
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Collection, Mapping
 
     from numpy.typing import NDArray
 
@@ -23,7 +23,16 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["DELAY", "Sensitivity", "Value", "fitted_values", "moved", "sensitivity"]
+__all__ = [
+    "DELAY",
+    "Sensitivity",
+    "Value",
+    "fitted_values",
+    "free_values",
+    "gradient",
+    "moved",
+    "sensitivity",
+]
 
 # Share of a value by which it is moved to see its effect.
 STEP = 1e-4
@@ -91,18 +100,63 @@ def fitted_values(model: IdentifiedModel) -> list[Value]:
         Entries of lists one by one; the delay of one record last.
     """
     entries = _entries(model)
+    free = {name for name, entry in entries.items() if entry.get("free", False)}
+    bounded = {name for name in free if entries[name].get("at_bound", False)}
+    values = free_values(model.model, free - bounded)
+    if len(model.records) <= 1 and model.details.get(DELAY, {}).get("free", False):
+        values.append(Value(DELAY))
+    return values
+
+
+def free_values(stage: Any, free: Collection[str]) -> list[Value]:
+    """List the numbers of some parameters of a stage that are not 0.
+
+    Parameters
+    ----------
+    stage : Stage
+        The stage.
+    free : collection of str
+        The parameters.
+
+    Returns
+    -------
+    list of Value
+        Entries of lists one by one.
+    """
     values: list[Value] = []
-    for name in model.model.parameter_names():
-        value, entry = getattr(model.model, name), entries.get(name, {})
-        if value is None or not entry.get("free", False) or entry.get("at_bound", False):
+    for name in stage.parameter_names():
+        value = getattr(stage, name)
+        if name not in free or value is None:
             continue
         if isinstance(value, tuple):
             values += [Value(name, k) for k, number in enumerate(value) if number != 0.0]
         elif value != 0.0:
             values.append(Value(name))
-    if len(model.records) <= 1 and model.details.get(DELAY, {}).get("free", False):
-        values.append(Value(DELAY))
     return values
+
+
+def gradient(model: IdentifiedModel, quantity: Callable[[IdentifiedModel], float]) -> Array:
+    """Differentiate a quantity of an identified model by the values that were fitted.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+    quantity : callable
+        Of a model beside it.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        Change with each of `fitted_values`; 0 where there is no such stage beside it.
+    """
+    slopes = []
+    for value in fitted_values(model):
+        size = STEP * abs(value.of(model))
+        ends = [moved(model, [value], np.array([way * size])) for way in (1.0, -1.0)]
+        up, down = (np.nan if one is None else quantity(one) for one in ends)
+        slopes.append((up - down) / (2.0 * size) if size else 0.0)
+    return np.asarray(np.nan_to_num(np.array(slopes, dtype=np.float64)))
 
 
 def _entries(model: IdentifiedModel) -> Mapping[str, Any]:
@@ -210,7 +264,6 @@ class _Linearised:
         self.record: Any = mine[-1] if mine else model
         # A model found by least squares creeps before its record; one that is searched is at rest.
         self.creeps = not model.model.info.searched
-        # The state at the first sample is not all due to the history: what is left is kept.
         reading = self.data.counted(self.data.y - self._reading(model, self.start.state))
         self.residual = reading - self._level(reading)
 

@@ -6,12 +6,10 @@ import math
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..._support.units import length_text, of_drive, shown_unit
 from ...errors import NumericalError
 from ...stages.slow_loop import SlowLoop
-from ..confidence.sensitivity import STEP, fitted_values, moved
+from ..confidence.sensitivity import gradient
 from ..fitted.notes import start_notes
 
 if TYPE_CHECKING:
@@ -180,15 +178,9 @@ def _reach(model: IdentifiedModel) -> float:
     ends = model.drive_range
     if covariance is None or ends is None:
         return math.nan
-    values, slopes = fitted_values(model), []
-    for value in values:
-        size = STEP * abs(value.of(model))
-        gains = [
-            math.nan if near is None else SlowLoop.of(near.model, *ends).gain
-            for near in (moved(model, [value], np.array([way * size])) for way in (1.0, -1.0))
-        ]
-        slopes.append((gains[0] - gains[1]) / (2.0 * size) if size else 0.0)
-    return float(covariance.reach(np.nan_to_num(np.array(slopes))))
+    return float(
+        covariance.reach(gradient(model, lambda near: SlowLoop.of(near.model, *ends).gain))
+    )
 
 
 def _creep(stage: Any) -> list[Row]:

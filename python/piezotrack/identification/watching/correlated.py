@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import next_fast_len
-from scipy.linalg import solve_toeplitz
+
+from ... import _core
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Autoregression"]
 
-# Order at most, and bound of the spectrum's resolution beside which it is nothing but rounding.
-HIGHEST, FLOOR = 24, 1e-12
+# Bound of the spectrum's resolution beside which it is nothing but rounding.
+FLOOR = 1e-12
 
 
 class Autoregression:
@@ -25,8 +26,7 @@ class Autoregression:
     .. math:: e_i = \sum_{k=1}^p a_k e_{i-k} + \epsilon_i, \qquad
         S(\omega) = \sigma^2 / |1 - \sum_k a_k e^{-i k \omega}|^2
 
-    by the Yule-Walker equations, of the order with the lowest criterion of Akaike (1974, doi
-    10.1109/TAC.1974.1100705), 24 at most.
+    as for `Covariance`.
 
     Parameters
     ----------
@@ -45,25 +45,11 @@ class Autoregression:
     """
 
     def __init__(self, residual: Array, fitted: int) -> None:
-        n = residual.size
         rest = residual - residual.mean()
-        size = next_fast_len(2 * n)
-        power = np.abs(np.fft.rfft(rest, size)) ** 2
-        covariance = np.fft.irfft(power, size)[: HIGHEST + 1] / max(n - fitted, 1)
-        self.count = n
-        self.coefficients, self.innovation = np.zeros(0), float(covariance[0])
-        if covariance[0] <= 0.0:
-            return
-        # A little white noise keeps the equations solvable.
-        covariance[0] *= 1.0 + 1e-9
-        best = n * float(np.log(covariance[0]))
-        for order in range(1, min(HIGHEST, n // 10) + 1):
-            found = solve_toeplitz(covariance[:order], covariance[1 : order + 1])
-            innovation = float(covariance[0] - found @ covariance[1 : order + 1])
-            if innovation <= 0.0:
-                break
-            if (criterion := n * float(np.log(innovation)) + 2.0 * order) < best:
-                best, self.coefficients, self.innovation = criterion, found, innovation
+        coefficients, innovation = _core.autoregression(rest)
+        self.count = residual.size
+        self.coefficients = np.array(coefficients)
+        self.innovation = innovation * residual.size / max(residual.size - fitted, 1)
 
     def _spectrum(self, size: int) -> Array:
         """Spectrum at the frequencies of a real transform of so many samples."""

@@ -42,7 +42,8 @@ HYSTERESIS: Mapping[str, tuple[str, ...]] = {
     "asymmetric-prandtl-ishlinskii": ("weights", "concave_weights", "convex_weights"),
     "preisach": ("masses",),
     "duhem": (),
-}  # Change for a difference quotient; of the delay in sampling intervals.
+}
+# Change for a difference quotient; of the delay in sampling intervals.
 STEP = 1e-3
 
 

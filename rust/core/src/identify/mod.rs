@@ -24,7 +24,7 @@ pub use experiments::step_response::{
     Conventional, StepReadings, StepResponse, read_step, separate,
 };
 pub use identification::{Identification, OwnResult, identify, identify_together};
-pub use inference::{Covariance, Linearised, covariance};
+pub use inference::{Autoregression, Covariance, Linearised, covariance};
 pub use least_squares::{
     CreepKind, DynamicsKind, LeastSquaresFit, NodesKind, RecordFit, Settings as WeightsSettings,
     Structure, WeightsDelay, WeightsRecord, identify_weights,

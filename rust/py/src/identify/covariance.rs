@@ -1,6 +1,6 @@
 //! Covariance of the values of a fit, and the values that ties give.
 
-use piezotrack_core::identify::{Linearised, Tie, covariance};
+use piezotrack_core::identify::{Autoregression, Linearised, Tie, covariance};
 use piezotrack_core::models::Model;
 use pyo3::prelude::*;
 
@@ -9,6 +9,7 @@ use crate::enter::enter_quiet_pool;
 use crate::errors::raise;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(autoregression, module)?)?;
     module.add_function(wrap_pyfunction!(linearised_covariance, module)?)?;
     module.add_function(wrap_pyfunction!(tied_values, module)?)
 }
@@ -17,10 +18,11 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 type Record<'py> =
     (Vec<Bound<'py, PyAny>>, Vec<Bound<'py, PyAny>>, Bound<'py, PyAny>, Bound<'py, PyAny>, f64);
 
-/// Rows of the covariance; whether each value is determined, its variance for independent residuals,
-/// what generalised least squares would change and the deviation of that; resampled deviations;
-/// orders.
-type Found = (Vec<Vec<f64>>, Vec<bool>, Vec<f64>, Vec<(f64, f64)>, Vec<Vec<f64>>, Vec<usize>);
+/// Rows of the covariance; whether each value is determined, its variance for independent noise, what
+/// generalised least squares would change and the deviation of that, the step to the least squares;
+/// resampled deviations; orders.
+type Found =
+    (Vec<Vec<f64>>, Vec<bool>, Vec<f64>, Vec<(f64, f64)>, Vec<f64>, Vec<Vec<f64>>, Vec<usize>);
 
 /// How sure the values of a fit are, whose records are linearised about it.
 #[pyfunction]
@@ -51,9 +53,17 @@ fn linearised_covariance(
         found.determined,
         found.independent,
         found.shifts,
+        found.steps,
         found.resampled,
         found.orders,
     ))
+}
+
+/// Coefficients and variance of the innovations of an autoregression of a noise.
+#[pyfunction]
+fn autoregression(noise: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, f64)> {
+    let found = Autoregression::of(&samples("noise", noise)?);
+    Ok((found.coefficients, found.variance))
 }
 
 /// Values of all parameters of a model, with those that are tied from the others.

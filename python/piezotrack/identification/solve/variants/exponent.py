@@ -197,15 +197,6 @@ class _Profile:
         self.values[n], self.costs[n] = {**known, **free}, float(costs[0])
         return self.costs[n]
 
-    def deviation(self, samples: int) -> float:
-        """Return the standard deviation of the exponent from the curvature of the profile."""
-        beside = [n for n in self.costs if n != 1.0 and abs(n - self.n) < 0.3 * self.n]
-        if len(beside) < 3:
-            return math.inf
-        squares = np.array([self.costs[n] ** 2 for n in beside])
-        curve = float(np.polyfit(np.array(beside) - self.n, squares, 2)[0])
-        return self.costs[self.n] / math.sqrt(curve * samples) if curve > 0.0 else math.inf
-
     def finished(
         self, problem: Problem, search: Callable[[Problem, Descents | None], Identification]
     ) -> Identification:
@@ -238,11 +229,9 @@ class _Profile:
             one = parameters[name]
             at_bound = not low < one.value < high
             parameters[name] = one._replace(bounds=(low, high), at_bound=at_bound)
-        spread = self.deviation(fit.data.counted(fit.data.y).size)
         parameters[NAME] = parameters[NAME]._replace(
             free=True,
             bounds=(1.0, MOST),
-            deviation=spread,
             at_bound=self.n >= MOST,
         )
         entries = dict(fit.details["parameters"])

@@ -12,7 +12,8 @@ const HIGHEST: usize = 20;
 const EACH: usize = 10;
 
 /// An autoregression, `n_t = sum_k a_k n_(t-k) + v_t`.
-pub(super) struct Autoregression {
+#[derive(Clone, Debug)]
+pub struct Autoregression {
     /// Its coefficients `a_k`; none for white noise.
     pub coefficients: Vec<f64>,
     /// Variance of the innovations v, in the square of the noise's unit.
@@ -23,6 +24,7 @@ impl Autoregression {
     /// Fits one to a noise, of the order that the criterion of Akaike chooses: Burg's method (Burg
     /// 1968; Kay 1988, Modern Spectral Estimation, section 7.6), Akaike 1974, doi
     /// 10.1109/TAC.1974.1100705.
+    #[must_use]
     pub fn of(noise: &[f64]) -> Self {
         let count = noise.len();
         let mut power = noise.iter().map(|x| x * x).sum::<f64>() / index(count.max(1));
@@ -64,7 +66,7 @@ impl Autoregression {
 
     /// Spectral density at a frequency, in shares of the sampling rate: the variance of the noise is
     /// its mean.
-    pub fn density(&self, frequency: f64) -> f64 {
+    pub(super) fn density(&self, frequency: f64) -> f64 {
         let (mut re, mut im) = (1.0, 0.0);
         let (sine, cosine) = sincos(TAU * frequency);
         let (mut c, mut s) = (cosine, sine);
@@ -77,7 +79,7 @@ impl Autoregression {
     }
 
     /// Innovations of a noise, from the sample on that has the whole order before it.
-    pub fn innovations(&self, noise: &[f64]) -> Vec<f64> {
+    pub(super) fn innovations(&self, noise: &[f64]) -> Vec<f64> {
         let order = self.coefficients.len();
         let of = |window: &[f64]| {
             let before = window[..order].iter().rev();
@@ -87,7 +89,7 @@ impl Autoregression {
     }
 
     /// The noise that innovations make, less the first `leading` samples.
-    pub fn noise(&self, innovations: &[f64], leading: usize) -> Vec<f64> {
+    pub(super) fn noise(&self, innovations: &[f64], leading: usize) -> Vec<f64> {
         let mut noise: Vec<f64> = Vec::with_capacity(innovations.len());
         for (t, v) in innovations.iter().enumerate() {
             let before = noise[t.saturating_sub(self.coefficients.len())..].iter().rev();

@@ -35,6 +35,8 @@ pub struct Covariance {
     pub independent: Vec<f64>,
     /// Change of each value by generalised least squares, and the standard deviation of that.
     pub shifts: Vec<(f64, f64)>,
+    /// Change of each value to where the squares are least, to first order.
+    pub steps: Vec<f64>,
     /// Deviations of each value over their own standard deviation, sizes only, of resampled noises.
     pub resampled: Vec<Vec<f64>>,
     /// Order of the autoregression of each record.
@@ -70,8 +72,11 @@ pub fn covariance(
         records.iter().map(|one| one.weight * squares(&one.residual)).sum::<f64>() / freedom;
     let noise = records.iter().map(|one| one.weight * squares(&one.noise)).sum::<f64>() / freedom;
     let mut square = precision * variance;
-    for one in &projected {
+    let mut slope = DVector::zeros(count);
+    for (record, one) in records.iter().zip(&projected) {
         square += one.columns.tr_mul(&one.columns) * one.weight;
+        let residual = DVector::from_column_slice(&record.residual);
+        slope += one.columns.tr_mul(&residual) * one.weight;
     }
     let inverse = Inverse::of(&square);
     let b = &inverse.matrix;
@@ -92,6 +97,7 @@ pub fn covariance(
         matrix: matrix.row_iter().map(|row| row.iter().copied().collect()).collect(),
         determined: inverse.determined,
         shifts,
+        steps: (b * slope).iter().copied().collect(),
         resampled,
         orders: projected.iter().map(|one| one.noise.coefficients.len()).collect(),
     })

@@ -6,5 +6,6 @@ mod fourier;
 mod linearised;
 mod resampling;
 
+pub use autoregression::Autoregression;
 pub use covariance::{Covariance, covariance};
 pub use linearised::Linearised;
