@@ -57,7 +57,7 @@ def several() -> pt.identification.Identification:
 
 
 class Drive(Result):
-    """What stands for a suggested drive."""
+    """Stand-in for a suggested drive."""
 
     def summary(self) -> str:
         return "0 to 3.6 V & up\n\na table"
