@@ -22,6 +22,8 @@ def test_an_unchanged_stage_exits_with_0() -> None:
     watched(22, top=55.0).save("log.csv")
     words = ran("watch", "model.json", "log.csv")
     assert "on log.csv: unchanged" in words
+    # No file was written, and none is listed.
+    assert words.rstrip().endswith("included")
     assert ran("watch", "model.json", "log.csv", "--quiet") == ""
 
 

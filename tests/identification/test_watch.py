@@ -151,6 +151,14 @@ def test_an_autoregression_gives_the_spread_of_a_mean_and_of_an_rms() -> None:
     assert effective == pytest.approx(2000.0 * (1.0 - 0.64) / (1.0 + 0.64), rel=0.15)
 
 
+def test_a_measured_stage_under_another_motion_is_unchanged() -> None:
+    fit = pt.identify(pt.datasets.dbo_training()[3.0:23.0], progress=False)
+    health = pt.watch(fit, pt.datasets.dbo_tracking()[3.0:23.0])
+    assert health.healthy
+    assert health["residual"].value is not None
+    assert 1.3 < health["residual"].value < 2.0
+
+
 @pytest.mark.slow
 def test_the_rates_of_false_alarms_and_of_hits() -> None:
     judged, alarms, hits = 0, Counter[str](), Counter[str]()

@@ -210,9 +210,11 @@ def can_be_written(out: Path, names: Iterable[str], *, overwrite: bool) -> None:
 
 
 def list_files(written: Iterable[Path]) -> None:
-    """Print which files were written."""
-    print("\nwritten")
-    for path in written:
+    """Print which files were written, if any were."""
+    files = list(written)
+    if files:
+        print("\nwritten")
+    for path in files:
         print(f"  {one_line(str(path))}")
 
 
