@@ -25,6 +25,8 @@ __all__ = ["with_rest", "with_rest_tried"]
 
 # Voltages of rest with a fit each.
 COARSE = 9
+# Samples of the beginning of a record on which they are compared.
+FIRST = 1500
 # Fits with a voltage of rest that was found from the one before, at most.
 ROUNDS = 3
 
@@ -88,9 +90,10 @@ def with_rest(problem: Problem, identify: Callable[[Problem], Identification]) -
     data = problem.records[0].data
     fit = _at_rest(problem, identify, 0.0)
     if carried_by_first_samples(_left(fit, fit.data)):
-        low, high = _voltages(data)
-        others = [_at_rest(problem, identify, float(v)) for v in np.linspace(low, high, COARSE)]
-        best = min(others, key=lambda other: other.cost)
+        begun = _begun(problem)
+        grid = np.linspace(*_voltages(data), COARSE)
+        costs = [_at_rest(begun, identify, float(volts)).cost for volts in grid]
+        best = _at_rest(problem, identify, float(grid[int(np.argmin(costs))]))
         fit = best if best.cost < (1.0 - GAIN) * fit.cost else fit
     for _ in range(ROUNDS):
         volts = best_voltage(fit, data)
@@ -140,6 +143,15 @@ def _voltages(data: Dataset) -> tuple[float, float]:
     low, high = float(data.full.u.min()), float(data.full.u.max())
     reach = 0.5 * (high - low)
     return min(low - reach, 0.0), max(high + reach, 0.0)
+
+
+def _begun(problem: Problem) -> Problem:
+    """Return the problem of the first part of a long record."""
+    (record,) = problem.records
+    data = record.data
+    if len(data) <= FIRST:
+        return problem
+    return replace(problem, records=(replace(record, data=data[: float(data.t[FIRST])]),))
 
 
 def _at_rest(
