@@ -20,7 +20,6 @@ from .situation import Situation, autocorrelation, criterion, independent_sample
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
@@ -181,21 +180,6 @@ class Residual(Result):
     def cause(self) -> str | None:
         """The missing ingredient; None where none explains it, or several do."""
         return self.candidates[0].name if self.likely == 1 else None
-
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Draw the residual against time, drive, rate and amplitude, and its spectrum.
-
-        Parameters
-        ----------
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure drawn in.
-        """
-        return super().plot(fig=fig)
 
 
 def residual_of(fit: Identification, record: int = 0) -> Residual:
