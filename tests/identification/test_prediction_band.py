@@ -73,13 +73,14 @@ def test_the_errors_of_a_cycle_are_those_of_a_fit_without_it() -> None:
     assert np.mean(errors.errors**2) > fit.cost**2
 
 
-@pytest.mark.parametrize("parts", [6, 40])
-def test_a_new_cycle_is_within_the_quantile(parts: int) -> None:
+@pytest.mark.parametrize("parts", [4, 10, 40])
+@pytest.mark.parametrize("unequal", [0.0, 0.3])
+def test_a_new_cycle_is_within_the_quantile(parts: int, unequal: float) -> None:
     draw = np.random.default_rng(7)
     within = []
     for _ in range(300):
         # Cycles differ by their size: samples of one are alike.
-        sizes = np.exp(0.5 * draw.standard_normal(parts + 1))
+        sizes = np.exp(unequal * draw.standard_normal(parts + 1))
         errors = np.abs(sizes[:, None] * draw.standard_normal((parts + 1, 50)))
         flat = np.zeros(parts * 50)
         known = HeldOut(
@@ -91,7 +92,7 @@ def test_a_new_cycle_is_within_the_quantile(parts: int) -> None:
         within.append(np.mean(errors[-1] <= known.quantile(0.9)))
     # 0.9 or more, to three deviations of the mean.
     assert np.mean(within) > 0.9 - 3.0 * np.std(within) / np.sqrt(300.0)
-    assert np.mean(within) < 0.985
+    assert np.mean(within) < 0.94
 
 
 def test_an_exact_model_has_the_noise_alone() -> None:

@@ -87,20 +87,23 @@ class HeldOut:
         Returns
         -------
         float
-            With so many parts that one of them may exceed it, the quantile of split conformal
-            prediction for samples in groups (Dunn, Wasserman and Ramdas 2023, doi
-            10.1080/01621459.2022.2060112) [m]; of fewer, that of a normal error whose size
-            follows from so many parts.
+            The quantile of the errors of cycles that were left out (Barber et al. 2021, doi
+            10.1214/20-AOS1965), enlarged for few cycles as Student's t is, with the degrees of
+            freedom of their mean squares (Satterthwaite 1946, doi 10.2307/3002019) [m].
         """
-        from scipy.special import stdtrit
+        from scipy.special import ndtri, stdtrit
 
         use = slice(None) if kept is None else kept
-        errors, parts = self.errors[use], np.unique(self.part[use]).size
-        if parts + 1 >= 1.0 / (1.0 - level):
-            share = min(level * (parts + 1) / parts, 1.0)
-            return float(np.quantile(errors, share, method="higher"))
-        reach = float(stdtrit(max(parts - 1, 1), 0.5 + 0.5 * level)) * math.sqrt(1.0 + 1.0 / parts)
-        return reach * float(np.sqrt(np.mean(errors**2)))
+        errors, part = self.errors[use], self.part[use]
+        counts = np.bincount(part)
+        squares = np.bincount(part, weights=errors**2)[counts > 0] / counts[counts > 0]
+        enlarged = 1.0
+        if squares.size > 1 and (spread := float(squares.var(ddof=1))) > 0.0:
+            freedom = max(squares.size - 1.0, 2.0 * float(squares.mean()) ** 2 / spread)
+            upper = 0.5 + 0.5 * level
+            # Beyond a million the two do not differ.
+            enlarged = float(stdtrit(min(freedom, 1e6), upper) / ndtri(upper))
+        return enlarged * float(np.quantile(errors, level))
 
     def at(self, amplitude: Array, rate: Array, level: float, noise: float) -> Parts:
         """Return what errors under another drive stay below with a probability.

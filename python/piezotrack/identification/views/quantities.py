@@ -171,11 +171,12 @@ def predicted(model: IdentifiedModel) -> list[Row]:
     within = f"within {length_text(covariance.predicted, 3)} (95 %) on another cycle like these"
     if (shares := covariance.shares) is None:
         return [("predicted", within)]
-    by = "model" if shares.model_error > shares.noise else "sensor"
-    limit = (
-        f"the {by}: {length_text(shares.model_error, 3)} repeats in every period, which no "
-        f"interval covers; noise {length_text(shares.noise, 3)}"
-    )
+    noise = f"noise {length_text(shares.noise, 3)}"
+    repeats = f"{length_text(shares.model_error, 3)} repeats in every period"
+    if shares.model_error > shares.noise:
+        limit = f"the model: {repeats}, which no interval covers; {noise}"
+    else:
+        limit = f"the sensor: {noise}; {repeats}"
     return [("predicted", within), ("limit", limit)]
 
 

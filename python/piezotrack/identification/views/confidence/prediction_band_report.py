@@ -63,11 +63,6 @@ def band_notes(band: PredictionBand) -> list[str]:
     notes = []
     if band.cycles < 2:
         notes.append("the records have no two cycles: the errors are those of the fit itself")
-    elif band.cycles + 1 < 1.0 / (1.0 - band.level):
-        notes.append(
-            f"{band.cycles} cycles are few for {100.0 * band.level:g} %: a normal distribution of "
-            "the errors is assumed"
-        )
     if (share := float(np.mean(band.unlike))) > 0.0:
         notes.append(
             f"{100.0 * share:.2g} % of the drive has an amplitude or a rate that the records do "
