@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import DataError, PiezotrackError
-from ..fitted.covariance import Covariance, NoiseShares
+from ..fitted.certainty.covariance import Covariance, NoiseShares
 from ..solve.search import details_of
 from ..solve.selection import period_of
 from .held_out import held_out

@@ -12,9 +12,9 @@ from ..._support.statistics import sample_noise
 from ...data.checks.diagnostics import amplitudes
 from ...data.dataset import Dataset
 from ...errors import ParameterError, ShapeError
-from ..fitted.covariance import normal_reach
+from ..fitted.certainty.covariance import normal_reach
+from ..fitted.certainty.prediction_band import PredictionBand
 from ..fitted.identified_model import IdentifiedModel
-from ..fitted.prediction_band import PredictionBand
 from .estimate import covariance_of
 from .held_out import held_out
 from .sensitivity import changes, fitted_values, sensitivity
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from ..fitted.covariance import Covariance
+    from ..fitted.certainty.covariance import Covariance
 
     Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from ...data.resampling import interpolated
 from ...errors import ParameterError, ShapeError
 from ...stages.delayed_reading import delayed_reading
 from ...stages.slow_loop import SlowLoop
-from .covariance import covariance_entry
+from .certainty.covariance import covariance_entry
 from .drift import drift_entry
 from .fitted_record import record_entries, record_of
 from .model_entries import (
@@ -46,10 +46,10 @@ if TYPE_CHECKING:
     from ...data.dataset import Hold
     from ...stages.inverse import Inverse
     from ...stages.motion import Response, StageState
-    from .covariance import Covariance
+    from .certainty.covariance import Covariance
+    from .certainty.prediction_band import PredictionBand
     from .drift import Drift
     from .fitted_record import FittedRecord
-    from .prediction_band import PredictionBand
     from .start import History, Start
 
     Array = NDArray[np.float64]

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from ...fitted.prediction_band import PredictionBand
+    from ...fitted.certainty.prediction_band import PredictionBand
 
 __all__ = ["plot_band"]
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...._support.units import length_text
 
 if TYPE_CHECKING:
-    from ...fitted.prediction_band import PredictionBand
+    from ...fitted.certainty.prediction_band import PredictionBand
 
 __all__ = ["band_notes", "band_text"]
 

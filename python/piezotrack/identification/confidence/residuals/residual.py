@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..._support.arguments import expect
-from ..._support.display.result import Result
-from ..._support.statistics import sample_noise
-from ...data.checks.diagnostics import amplitudes
-from ...errors import ParameterError
-from ..fitted.identification import Identification
+from ...._support.arguments import expect
+from ...._support.display.result import Result
+from ...._support.statistics import sample_noise
+from ....data.checks.diagnostics import amplitudes
+from ....errors import ParameterError
+from ...fitted.identification import Identification
 from .ingredients import explanations
 from .situation import Situation, autocorrelation, criterion, independent_samples
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...data.dataset import Dataset
+    from ....data.dataset import Dataset
     from .situation import Explained
 
     Array = NDArray[np.float64]

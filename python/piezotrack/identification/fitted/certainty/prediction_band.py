@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from ..._support.display.result import Result
+from ...._support.display.result import Result
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

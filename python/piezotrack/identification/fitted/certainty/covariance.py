@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ... import _core
-from ..._support.files.json_text import object_of
-from ..._support.messages import quoted
-from ...errors import ParameterError
+from .... import _core
+from ...._support.files.json_text import object_of
+from ...._support.messages import quoted
+from ....errors import ParameterError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
