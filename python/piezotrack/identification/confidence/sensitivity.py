@@ -75,14 +75,17 @@ class Sensitivity:
     columns : ndarray, shape (p, n)
         Change of the displacement with each value, in the unit of the value [m/...].
     nuisance : ndarray, shape (q, n)
-        The same of what belongs to the record alone: offset, drift, voltage before the record,
-        and of one of several records its delay.
+        The same of what belongs to the record alone, a row each of `alone`.
+    alone : tuple of str
+        What belongs to the record alone: ``"offset"``, ``"drift"``, ``"drift_time"``,
+        ``"voltage_before"``, and of one of several records its ``"delay"``.
     residual : ndarray, shape (n,)
         Measured less simulated displacement [m].
     """
 
     columns: Array
     nuisance: Array
+    alone: tuple[str, ...]
     residual: Array
 
 
@@ -242,9 +245,11 @@ def sensitivity(model: IdentifiedModel, data: Dataset, values: list[Value]) -> S
     sizes = [_step(value, model, data) for value in values]
     columns = [record.column(value, size) for value, size in zip(values, sizes, strict=True)]
     shape = (len(values), record.residual.size)
+    nuisance = record.nuisance()
     return Sensitivity(
         columns=np.array(columns).reshape(shape),
-        nuisance=np.array(record.nuisance()).reshape(-1, shape[1]),
+        nuisance=np.array(list(nuisance.values())).reshape(-1, shape[1]),
+        alone=tuple(nuisance),
         residual=record.residual,
     )
 
@@ -269,37 +274,39 @@ class _Linearised:
 
     def _level(self, reading: Array) -> Array:
         """Offset and drift that suit a residual best."""
-        columns = self._sensor()
+        columns = list(self._sensor().values())
         if not columns:
             return np.zeros(reading.size)
         basis = np.array(columns).T
         return np.asarray(basis @ np.linalg.lstsq(basis, reading, rcond=1e-12)[0])
 
-    def _sensor(self) -> list[Array]:
+    def _sensor(self) -> dict[str, Array]:
         """Columns of the offset and of the drift's size."""
         t = self.data.counted(self.data.t)
         drift = self.record.drift
-        columns = [np.ones(t.size)] if self.record.offset_fitted or drift else []
+        columns = {"offset": np.ones(t.size)} if self.record.offset_fitted or drift else {}
         if drift:
-            columns.append(np.exp(-(t - drift.begin) / drift.time))
+            columns["drift"] = np.exp(-(t - drift.begin) / drift.time)
         return columns
 
-    def nuisance(self) -> list[Array]:
+    def nuisance(self) -> dict[str, Array]:
         """Columns of what belongs to the record alone."""
         columns = self._sensor()
         drift = self.record.drift
         if drift and drift.time_fitted:
             t = self.data.counted(self.data.t)
             ends = [np.exp(-(t - drift.begin) / (s * drift.time)) for s in (1 + STEP, 1 - STEP)]
-            columns.append((ends[0] - ends[1]) / (2.0 * STEP))
+            columns["drift_time"] = (
+                drift.amplitude * (ends[0] - ends[1]) / (2.0 * STEP * drift.time)
+            )
         if self.start.history == "fit" and self.start.voltage is not None:
             reach = BEFORE * float(np.ptp(self.data.full.u))
             states = [self._begun(self.model, self.start.voltage + s) for s in (reach, -reach)]
             up, down = (self._counted(self.model, state) for state in states)
-            columns.append((up - down) / (2.0 * reach))
+            columns["voltage_before"] = (up - down) / (2.0 * reach)
         several = len(self.model.records) > 1
         if several and "delay" in self.record.parameters:
-            columns.append(self._delayed())
+            columns["delay"] = self._delayed()
         return columns
 
     def _delayed(self) -> Array:
