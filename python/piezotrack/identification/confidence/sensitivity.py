@@ -13,7 +13,7 @@ from ..fitted.identified_model import IdentifiedModel
 from ..fitted.start import same_beginning, start_after, start_at_jump
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -198,7 +198,8 @@ def moved(model: IdentifiedModel, values: list[Value], changes: Array) -> Identi
             numbers[value.entry] += change
             changed[value.parameter] = tuple(numbers)
     try:
-        stage = replace(model.model, **{**changed, **_tied(model, changed)})
+        changed |= _tied(model, changed) | _normalised(model, changed)
+        stage = replace(model.model, **changed)
     except PiezotrackError:
         return None
     return replace(_without_search(model), model=stage, delay=delay)
@@ -215,6 +216,38 @@ def _tied(model: IdentifiedModel, changed: Mapping[str, Any]) -> dict[str, float
     known = [0.0 if value is None else float(value) for value in values]
     tied = _core.tied_values(model.model.info.name, known, ties)
     return {scalars[place]: tied[place] for place, _ in ties}
+
+
+def _normalised(model: IdentifiedModel, changed: Mapping[str, Any]) -> dict[str, Any]:
+    """Values that follow from others in a fit by least squares."""
+    stage = model.model
+    if stage.info.searched or not changed:
+        return {}
+    now = {name: changed.get(name, getattr(stage, name)) for name in stage.parameter_names()}
+    if "slip_displacements" in now:
+        # The thresholds stay where they are.
+        known = (stage.piezo_coefficient, stage.stiffness_ratios)
+        drive = _slips(*known, stage.slip_displacements, inverse=True)
+        slips = _slips(now["piezo_coefficient"], now["stiffness_ratios"], drive)
+        return {"slip_displacements": slips}
+    if now.get("scale") is None or stage.falling_scale is not None or model.drive_range is None:
+        return {}
+    # The envelope is 0 at 0 V and rises by as much as the drive.
+    ends = np.array(model.drive_range)
+    rise = float(np.diff(np.tanh(stage.slope * ends + stage.shift))[0]) * stage.scale
+    scale = rise / float(np.diff(np.tanh(now["slope"] * ends + now["shift"]))[0])
+    middle = stage.level + stage.scale * np.tanh(stage.shift)
+    return {"scale": scale, "level": float(middle - scale * np.tanh(now["shift"]))}
+
+
+def _slips(
+    gain: float, ratios: Sequence[float], at: Sequence[float], *, inverse: bool = False
+) -> tuple[float, ...]:
+    """Displacements at which elements slip [m], of thresholds of the drive [V]; or the inverse."""
+    stiffness = 1.0 + np.append(np.cumsum(ratios[::-1])[::-1], 0.0)[: len(at)]
+    slopes = abs(gain) / stiffness
+    steps = np.diff(np.array(at), prepend=0.0)
+    return tuple(np.cumsum(steps / slopes if inverse else steps * slopes).tolist())
 
 
 def _without_search(model: IdentifiedModel) -> IdentifiedModel:
