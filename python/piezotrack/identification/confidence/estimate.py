@@ -13,7 +13,7 @@ from ... import _core
 from ...errors import DataError, PiezotrackError
 from ..fitted.certainty.covariance import Covariance, NoiseShares
 from ..solve.search import details_of
-from ..solve.selection import period_of
+from ..solve.selection import SAME_PERIOD, period_of
 from .held_out import held_out
 from .sensitivity import DELAY, Value, fitted_values, gradient, sensitivity
 
@@ -260,9 +260,24 @@ class _Linear:
         )
 
 
+def _period(data: Dataset) -> int | None:
+    """Period of a drive that repeats, be it of several amplitudes."""
+    period = period_of(data)
+    if period is not None:
+        return period
+    u = data.u
+    turns = _core.turns(u, 0.5 * float(np.ptp(u)))
+    near = SAME_PERIOD * float(np.std(u))
+    for turn in turns[2::2]:
+        for after in (turn - turns[0] - 1, turn - turns[0], turn - turns[0] + 1):
+            if after * PERIODS <= u.size and float(np.std(u[after:] - u[:-after])) <= near:
+                return int(after)
+    return None
+
+
 def _without_repeated(residual: Array, data: Dataset) -> tuple[Array, NoiseShares | None]:
     """Noise of a residual: what does not repeat with the drive; and both shares."""
-    period = period_of(data)
+    period = _period(data)
     if period is None or residual.size != data.u.size:
         return residual, None
     count = residual.size // period
