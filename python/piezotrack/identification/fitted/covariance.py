@@ -78,6 +78,8 @@ class Covariance:
         Whether the records determine each value.
     independent : ndarray, shape (p,)
         Standard deviations for independent noise of the same size, SI.
+    factors : ndarray, shape (p,)
+        Variance of each value over that for an independent residual of the same size.
     widening : ndarray, shape (p,)
         Factor of the 95 % interval, by the bootstrap, over that of normal deviations.
     shifts : ndarray, shape (p, 2)
@@ -117,6 +119,7 @@ class Covariance:
     matrix: Array
     determined: NDArray[np.bool_]
     independent: Array
+    factors: Array
     widening: Array
     shifts: Array
     to_least_cost: Array

@@ -130,7 +130,7 @@ impl LocalRefinement<'_> {
     }
 
     /// Samples less what was fitted to them, with an offset of each record, and the size of its drift.
-    fn freedom(&self, count: usize) -> f64 {
+    pub(in crate::identify) fn freedom(&self, count: usize) -> f64 {
         let drifts = self.records.problems().filter(|problem| problem.has_drift()).count();
         let fitted = count + self.records.members().len() + drifts;
         index(self.records.samples().saturating_sub(fitted).max(1))
