@@ -93,6 +93,19 @@ def test_there_and_back_bit_for_bit(tmp_path: Path, seed: int) -> None:
     assert back.scale_assumed == model.scale_assumed
 
 
+def test_the_intervals_of_a_file_are_those_of_the_fit(tmp_path: Path) -> None:
+    fit = fitted()
+    back = pt.load(fit.save(tmp_path / "dahl.json"))
+    assert fit.covariance is not None
+    assert back.covariance is not None
+    for name in fit.covariance.names:
+        assert back.covariance.interval(name) == fit.covariance.interval(name)
+    np.testing.assert_array_equal(back.covariance.matrix, fit.covariance.matrix)
+    assert back.covariance.shares == fit.covariance.shares
+    assert back.zeroed().covariance is back.covariance
+    assert back.document()["covariance"] == fit.document()["covariance"]
+
+
 def test_zeros_keep_their_sign(tmp_path: Path) -> None:
     stage = replace(pt.DahlStage.xu_li_2010(), damping=0.0, a1=0.0, a2=-0.0, b1=-0.0)
     model = published(model=stage, offset=-0.0)

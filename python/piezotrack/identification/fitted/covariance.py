@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ... import _core
+from ..._support.files.json_text import object_of
 from ..._support.messages import quoted
 from ...errors import ParameterError
 
@@ -18,10 +19,12 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Covariance", "Interval", "NoiseShares"]
+__all__ = ["Covariance", "Interval", "NoiseShares", "covariance_entry", "covariance_of_file"]
 
 # Correlation from which on a pair of values is named.
 CORRELATED = 0.95
+# Lists of a covariance with an entry for each value, as a model file has them.
+LISTS = ("values", "determined", "independent", "widening", "shifts", "to_least_cost")
 
 
 class Interval(NamedTuple):
@@ -249,3 +252,88 @@ def _normal(level: float) -> float:
     if not 0.0 < share < 1.0:
         raise ParameterError("level", share, "a number between 0 and 1")
     return NormalDist().inv_cdf(0.5 + 0.5 * share)
+
+
+def covariance_entry(covariance: Covariance | None) -> dict[str, Any]:
+    """Entries of a model file on the covariance; none where there is none.
+
+    Parameters
+    ----------
+    covariance : Covariance or None
+        Of the values that were fitted.
+
+    Returns
+    -------
+    dict
+        Of numbers, texts, lists and dicts only, SI; of the matrix the lower triangle.
+    """
+    if covariance is None:
+        return {}
+    entry: dict[str, Any] = {
+        "names": list(covariance.names),
+        "matrix": [row[: i + 1].tolist() for i, row in enumerate(covariance.matrix)],
+        **{name: getattr(covariance, name).tolist() for name in LISTS},
+        "samples": covariance.samples,
+        "orders": list(covariance.orders),
+    }
+    if covariance.shares is not None:
+        parts = covariance.shares._asdict().items()
+        entry["shares"] = {name: {"value": value, "unit": "m"} for name, value in parts}
+    return {"covariance": entry}
+
+
+def covariance_of_file(entry: Any) -> Covariance | None:
+    """Read the covariance of a model file.
+
+    Parameters
+    ----------
+    entry : Any
+        What `covariance_entry` wrote; None where the file has none.
+
+    Returns
+    -------
+    Covariance or None
+        The covariance, its numbers as they were saved.
+
+    Raises
+    ------
+    ParameterError
+        The entry has another form, or a list another length.
+    """
+    if entry is None:
+        return None
+    found = object_of("covariance", entry)
+    names = [str(name) for name in found["names"]]
+    matrix = np.zeros((len(names), len(names)))
+    rows = found["matrix"]
+    if [len(row) for row in rows] != list(range(1, len(names) + 1)):
+        expected = f"the lower triangle of {len(names)} rows, one for each name"
+        raise ParameterError("covariance: matrix", f"{len(rows)} rows", expected, verb="has")
+    for i, row in enumerate(rows):
+        matrix[i, : i + 1] = matrix[: i + 1, i] = _numbers("matrix", row)
+    lists = {name: _numbers(name, found[name]) for name in LISTS}
+    for name, numbers in lists.items():
+        if numbers.shape != ((len(names), 2) if name == "shifts" else (len(names),)):
+            raise ParameterError(
+                f"covariance: {name}", f"{len(numbers)} entries", f"{len(names)}", verb="has"
+            )
+    shares = {
+        name: _core.as_number(f"covariance: {name}", part["value"])
+        for name, part in object_of("covariance: shares", found.get("shares")).items()
+    }
+    return Covariance(
+        names=tuple(names),
+        matrix=matrix,
+        **{**lists, "determined": lists["determined"] != 0.0},
+        samples=_core.as_count("covariance: samples", found["samples"]),
+        orders=tuple(_core.as_count("covariance: orders", order) for order in found["orders"]),
+        shares=NoiseShares(**shares) if shares else None,
+    )
+
+
+def _numbers(name: str, values: Any) -> Array:
+    """Take a list of numbers of a file; what is not finite is null there."""
+    numbers = np.array(values, dtype=np.float64)
+    if name in ("matrix", "values", "widening", "to_least_cost") and not np.isfinite(numbers).all():
+        raise ParameterError(f"covariance: {name}", "null", "finite numbers", verb="has")
+    return numbers

@@ -20,6 +20,7 @@ from ...data.resampling import interpolated
 from ...errors import ParameterError, ShapeError
 from ...stages.delayed_reading import delayed_reading
 from ...stages.slow_loop import SlowLoop
+from .covariance import covariance_entry
 from .drift import drift_entry
 from .fitted_record import record_entries, record_of
 from .model_entries import (
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from ...data.dataset import Hold
     from ...stages.inverse import Inverse
     from ...stages.motion import Response, StageState
+    from .covariance import Covariance
     from .drift import Drift
     from .fitted_record import FittedRecord
     from .intervals.confidence import Confidence
@@ -90,6 +92,9 @@ class IdentifiedModel(Result):
     interpolation : int or None
         Samples to which each of a record whose drive is fast for its sampling rate is interpolated,
         as in the fit: band-limited. None where the drive goes straight from sample to sample.
+    covariance : Covariance or None
+        How sure the values are; None where the record is too short for it, and in files of older
+        versions.
     details : mapping
         Other entries of the model file: fit, provenance.
     """
@@ -113,6 +118,7 @@ class IdentifiedModel(Result):
     drift: Drift | None = None
     records: tuple[FittedRecord, ...] = ()
     interpolation: int | None = None
+    covariance: Covariance | None = field(default=None, repr=False, compare=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
@@ -702,6 +708,7 @@ class IdentifiedModel(Result):
             **drift_entry(self.drift),
             **({"interpolation": self.interpolation} if self.interpolation else {}),
             **record_entries(self.records, self.drive_unit),
+            **covariance_entry(self.covariance),
             **details,
         }
 
