@@ -235,11 +235,10 @@ def test_each_parameter_has_a_panel() -> None:
 
     fit = fitted(measured(), damping=1e3)
     for method in ("profile", "bootstrap"):
-        figure = fit.confidence(method=method).plot(fig=Figure(layout="constrained"))
+        sure = fit.confidence(method=method)
+        figure = sure.plot(fig=Figure(layout="constrained"))
         shown = [ax.get_xlabel() for ax in figure.axes if ax.axison]
-        assert [one.split(" [")[0] for one in shown] == list(
-            fit.confidence(method=method).parameters
-        )
+        assert [one.split(" [")[0] for one in shown] == list(sure.parameters)
 
 
 def test_what_has_no_intervals_is_refused_in_a_sentence(tmp_path: Path) -> None:

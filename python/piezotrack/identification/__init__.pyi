@@ -38,6 +38,9 @@ from .fitted.estimates import SwarmRun as SwarmRun
 from .fitted.fitted_record import FittedRecord as FittedRecord
 from .fitted.identification import Identification as Identification
 from .fitted.identified_model import IdentifiedModel as IdentifiedModel
+from .fitted.intervals.confidence import Confidence as Confidence
+from .fitted.intervals.confidence import LowerMinimum as LowerMinimum
+from .fitted.intervals.confidence import ParameterInterval as ParameterInterval
 from .fitted.model_file import load as load
 from .fitted.score import Score as Score
 from .fitted.selection import Selection as Selection

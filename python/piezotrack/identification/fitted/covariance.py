@@ -24,7 +24,15 @@ __all__ = ["Covariance", "Interval", "NoiseShares", "covariance_entry", "covaria
 # Correlation from which on a pair of values is named.
 CORRELATED = 0.95
 # Lists of a covariance with an entry for each value, as a model file has them.
-LISTS = ("values", "determined", "independent", "widening", "shifts", "to_least_cost")
+LISTS = (
+    "values",
+    "determined",
+    "independent",
+    "factors",
+    "widening",
+    "shifts",
+    "to_least_cost",
+)
 
 
 class Interval(NamedTuple):
@@ -334,6 +342,7 @@ def covariance_of_file(entry: Any) -> Covariance | None:
 def _numbers(name: str, values: Any) -> Array:
     """Take a list of numbers of a file; what is not finite is null there."""
     numbers = np.array(values, dtype=np.float64)
-    if name in ("matrix", "values", "widening", "to_least_cost") and not np.isfinite(numbers).all():
+    finite = name not in ("determined", "independent", "shifts")
+    if finite and not np.isfinite(numbers).all():
         raise ParameterError(f"covariance: {name}", "null", "finite numbers", verb="has")
     return numbers

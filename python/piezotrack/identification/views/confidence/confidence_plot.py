@@ -83,14 +83,18 @@ def _interval(ax: Axes, one: ParameterInterval) -> None:
 
 
 def _profile(ax: Axes, one: ParameterInterval) -> None:
-    """Draw a profile as far as it is near the threshold: its root goes straight between points."""
+    """Draw a profile as far as it is near the threshold.
+
+    Its root goes straight between points; at a bound the profile itself.
+    """
     near = np.flatnonzero(one.rises <= HIGHEST)
     inside = one.values[near]
     width = float(np.ptp(inside)) or abs(one.value)
     low, high = float(inside[0]) - 0.15 * width, float(inside[-1]) + 0.15 * width
     drawn = np.linspace(max(low, one.values[0]), min(high, one.values[-1]), POINTS)
-    roots = np.interp(drawn, one.values, np.sqrt(one.rises))
-    ax.plot(drawn, roots**2, **SIMULATED)
+    power = 1.0 if one.on_bound else 2.0
+    straight = np.interp(drawn, one.values, one.rises ** (1.0 / power))
+    ax.plot(drawn, straight**power, **SIMULATED)
     ax.plot(one.values, one.rises, **{**MARKS, "markersize": 3.5})
     ax.axhline(1.0, **LEVEL)
     ax.set(xlim=(low, high), ylim=(-0.05 * HIGHEST, HIGHEST))
