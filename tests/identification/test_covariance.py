@@ -158,6 +158,39 @@ def test_several_records_determine_values_better() -> None:
     assert np.allclose(ratio, 0.5, rtol=0.25)
 
 
+def delays_of(pole: float) -> list[pt.identification.Estimate]:
+    """Delays of two records of a stage with dry friction."""
+    stage = pt.FirstOrderDahlStage(
+        mass=1e-3,
+        damping=100.0,
+        piezo_coefficient=1.0,
+        stiffness=1e6,
+        rest_stiffness=2e5,
+        coulomb_force=5.0,
+    )
+    rng, u = np.random.default_rng(6), nested(4.0)
+    t = np.arange(u.size) * DT
+    x = stage.simulate(u, DT, initial=stage.equilibrium(u[0])).x
+    logs = [
+        pt.Dataset(u=u, y=np.interp(t - late, t, x) + correlated(rng, u.size, pole, 50e-9), dt=DT)
+        for late in (4e-3, 8e-3)
+    ]
+    known = {"stiffness": 1e6, "damping": 100.0, "mass": 1e-3}
+    fit = pt.identify(logs, "first-order-dahl", delay=True, history="virgin", parameters=known)
+    return [record.parameters["delay"] for record in fit.records]
+
+
+def test_a_delay_of_each_record_has_a_deviation_that_grows_with_correlated_noise() -> None:
+    white, coloured = delays_of(0.0), delays_of(0.9)
+    for one, other, late in zip(white, coloured, (4e-3, 8e-3), strict=True):
+        assert one.deviation is not None
+        assert other.deviation is not None
+        assert abs(other.value - late) < 4.0 * other.deviation
+        assert abs(one.value - late) < 4.0 * one.deviation
+        # A sine below the pole's frequency sees the square root of (1 + pole) / (1 - pole).
+        assert 2.5 < other.deviation / one.deviation < 6.0
+
+
 def test_wrong_levels_and_names_are_refused() -> None:
     u = nested(4.0)
     log = pt.Dataset(u=u, y=STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x, dt=DT)

@@ -17,7 +17,7 @@ from ..solve.selection import period_of
 from .sensitivity import DELAY, Value, fitted_values, gradient, sensitivity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -58,28 +58,87 @@ def with_covariance(fit: Identification) -> Identification:
         covariance = covariance_of(fit, records)
     except PiezotrackError:
         covariance = None
+    known = [{} for _ in fit.records] if covariance is None else _of_each_record(fit, covariance)
     parameters = {
-        name: estimate._replace(deviation=_deviation(fit, covariance, name, estimate))
+        name: estimate._replace(deviation=_deviation(fit, covariance, name, estimate, known[0]))
         for name, estimate in fit.parameters.items()
     }
+    several = tuple(
+        replace(one, parameters=_of_record(one.parameters, own))
+        for one, own in zip(fit.records, known, strict=True)
+    )
     entries = dict(fit.details.get("parameters", {}))
     entries |= {name: details_of(parameters[name]) for name in set(entries) & set(parameters)}
     details: dict[str, Any] = {**fit.details, "parameters": entries}
     if DELAY in parameters:
         details[DELAY] = details_of(parameters[DELAY])
-    return replace(fit, covariance=covariance, parameters=parameters, details=details)
+    return replace(
+        fit, covariance=covariance, parameters=parameters, records=several, details=details
+    )
+
+
+def _of_record(
+    estimates: Mapping[str, Estimate], known: Mapping[str, float]
+) -> dict[str, Estimate]:
+    return {n: one._replace(deviation=known.get(n, one.deviation)) for n, one in estimates.items()}
 
 
 def _deviation(
-    fit: Identification, covariance: Covariance | None, name: str, estimate: Estimate
+    fit: Identification,
+    covariance: Covariance | None,
+    name: str,
+    estimate: Estimate,
+    known: Mapping[str, float],
 ) -> float | None:
     """Return the standard deviation of a parameter of a search."""
     if covariance is not None and name in covariance.names:
         return covariance.deviation(name)
     if estimate.tie is not None and covariance is not None:
         return covariance.reach(gradient(fit, Value(name).of), level=0.6826894921370859)
-    # On a bound, and of what belongs to a record, for independent residuals.
-    return estimate.deviation
+    return known.get(name, estimate.deviation)
+
+
+def _of_each_record(fit: Identification, covariance: Covariance) -> list[dict[str, float]]:
+    """Return the standard deviations of what was fitted to each record alone."""
+    free = [
+        {name for name, one in record.parameters.items() if one.free and not one.at_bound}
+        for record in fit.records
+    ]
+    known: list[dict[str, float]] = [{} for _ in free]
+    if len(free) == 1 and DELAY in free[0] and DELAY in covariance.names:
+        known[0][DELAY] = covariance.deviation(DELAY)
+        free[0].remove(DELAY)
+    if not any(free):
+        return known
+    values = fitted_values(fit)
+    sizes = _sizes(fit, values)
+    records = [(one.data, one.weight) for one in fit.records if one.data is not None]
+    linear = [sensitivity(fit, data, values) for data, _ in records]
+    rows = [(r, name) for r, one in enumerate(linear) for name in one.alone if name in free[r]]
+    extended = [
+        _Linear(_with_rows(one, r, rows), data, weight, np.append(sizes, np.ones(len(rows))))
+        for r, (one, (data, weight)) in enumerate(zip(linear, records, strict=True))
+    ]
+    precision = np.diag(np.append(_precision(fit, values) * sizes**2, np.zeros(len(rows))))
+    matrix, determined, *_ = _core.linearised_covariance(
+        [record.thinned(MOST) for record in extended], precision.tolist(), 0, SEED
+    )
+    for k, (r, name) in enumerate(rows, start=len(values)):
+        known[r][name] = math.sqrt(matrix[k][k]) if determined[k] else math.inf
+    return known
+
+
+def _with_rows(linear: Sensitivity, record: int, rows: list[tuple[int, str]]) -> Sensitivity:
+    """Take what belongs to records alone for values, 0 in the other records."""
+    mine = dict(zip(linear.alone, linear.nuisance, strict=True))
+    none = np.zeros(linear.residual.size)
+    added = [mine.pop(name) if r == record else none for r, name in rows]
+    return replace(
+        linear,
+        columns=np.concatenate([linear.columns, added]),
+        nuisance=np.array(list(mine.values())).reshape(-1, none.size),
+        alone=tuple(mine),
+    )
 
 
 def covariance_of(
@@ -112,7 +171,7 @@ def covariance_of(
     values = fitted_values(model)
     if not values:
         raise DataError("no value was fitted: expected one or more")
-    sizes = np.array([abs(value.of(model)) or records[0][0].dt for value in values])
+    sizes = _sizes(model, values)
     linear = [
         _Linear(sensitivity(model, data, values), data, weight, sizes, noise)
         for data, weight in records
@@ -149,6 +208,11 @@ def covariance_of(
     )
 
 
+def _sizes(model: IdentifiedModel, values: list[Value]) -> Array:
+    """Sizes of the values, SI; 1 of one that is 0."""
+    return np.array([abs(value.of(model)) or 1.0 for value in values], dtype=np.float64)
+
+
 def _precision(model: IdentifiedModel, values: list[Value]) -> Array:
     """Inverse squares of the widths of the priors, SI; 0 without one."""
     entries = model.details.get("parameters", {})
@@ -167,7 +231,7 @@ class _Linear:
         data: Dataset,
         weight: float,
         sizes: Array,
-        noise: Literal["not repeated", "residual"],
+        noise: Literal["not repeated", "residual"] = "not repeated",
     ) -> None:
         self.columns, self.nuisance = linear.columns * sizes[:, None], linear.nuisance
         self.residual, self.weight = linear.residual, weight

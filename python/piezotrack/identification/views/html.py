@@ -78,7 +78,7 @@ def _estimate(fit: Identification, name: str, estimate: Estimate) -> tuple[str, 
     if not estimate.free and estimate.tie is None:
         deviation = "held"
     elif estimate.deviation is None:
-        deviation = "unknown"
+        deviation = "" if estimate.at_bound else "unknown"
     else:
         deviation = (
             f"{estimate.deviation:.2g}" if math.isfinite(estimate.deviation) else "no effect"
@@ -88,7 +88,7 @@ def _estimate(fit: Identification, name: str, estimate: Estimate) -> tuple[str, 
         estimate.symbol,
         f"{estimate.value:.6g}",
         estimate.unit,
-        deviation + parameter_notes(fit, name),
+        (deviation + parameter_notes(fit, name)).removeprefix(", "),
     )
 
 

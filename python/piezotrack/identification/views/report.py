@@ -404,14 +404,14 @@ def _row(fit: Identification, name: str, estimate: Estimate, width: int) -> str:
     elif estimate.deviation == 0.0:
         note = "held"
     elif estimate.deviation is None:
-        note = "unknown"
+        note = "" if estimate.at_bound else "unknown"
     elif not math.isfinite(estimate.deviation):
         note = "no effect on the data"
     else:
         share = 100 * estimate.deviation / abs(estimate.value) if estimate.value else math.inf
         digits = f"{share:.2g}" if share < 10 else f"{share:.0f}"
         note = f"{digits} %" if share < 100 else "larger than the value"
-    note += parameter_notes(fit, name)
+    note = (note + parameter_notes(fit, name)).removeprefix(", ")
     return (
         f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
     ).rstrip()

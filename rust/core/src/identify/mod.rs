@@ -18,7 +18,7 @@ pub use cost::journal::Journal;
 pub use cost::residual_sums::Costs;
 pub use cost::several_records::Records;
 pub use descent::lag::LagRange;
-pub use descent::levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
+pub use descent::levenberg_marquardt::{LocalRefinement, Polished};
 pub use experiments::cross_talk::{CrossTalk, cross_talk};
 pub use experiments::sensor_noise::{Noise, noise_at_rest};
 pub use experiments::step_response::{

@@ -181,7 +181,8 @@ def _remark(estimate: Estimate) -> str:
         return "no effect on the data" if moves else "held: no effect on the data"
     if not moves or estimate.deviation == 0.0:
         return "held"
-    return "" if estimate.deviation is not None else "interval unknown"
+    known = estimate.deviation is not None or estimate.at_bound
+    return "" if known else "interval unknown"
 
 
 def _values(fit: Identification) -> Table:

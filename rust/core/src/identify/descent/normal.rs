@@ -20,8 +20,6 @@ pub(in crate::identify) struct Normal {
     pub square: DMatrix<f64>,
     /// J^T r, r being measured less simulated.
     pub slope: DVector<f64>,
-    /// Samples that entered.
-    pub rows: usize,
     /// `J^T x_vv` with the second derivative of the displacement x along each step that was asked for;
     /// none of a step that could not be simulated.
     pub bends: [Option<DVector<f64>>; STEPS],
@@ -46,15 +44,15 @@ pub(in crate::identify) struct Spot {
     pub held: Option<usize>,
 }
 
-/// First the rows, -1 where a neighbour could not be simulated; NaN for bends that there are not.
+/// First 1, or -1 where a neighbour could not be simulated; NaN for bends that there are not.
 impl Answer for Option<Normal> {
     fn length(coordinates: usize) -> usize {
         1 + coordinates * (1 + coordinates + STEPS)
     }
 
     fn write(&self, numbers: &mut Vec<f64>, coordinates: usize) {
-        if let Some(Normal { square, slope, rows, bends }) = self {
-            numbers.push(index(*rows));
+        if let Some(Normal { square, slope, bends }) = self {
+            numbers.push(1.0);
             numbers.extend(slope.iter());
             numbers.extend(square.iter());
             let none = DVector::from_element(coordinates, f64::NAN);
@@ -68,26 +66,19 @@ impl Answer for Option<Normal> {
     }
 
     fn read(numbers: &[f64], coordinates: usize) -> Self {
-        let (&rows, rest) = numbers.split_first()?;
+        let (&first, rest) = numbers.split_first()?;
         let (slope, rest) = rest.split_at_checked(coordinates)?;
         let (square, bends) = rest.split_at_checked(coordinates * coordinates)?;
         let bend = |i: usize| {
             let bend = bends.get(i * coordinates..(i + 1) * coordinates)?;
             (!bend.iter().any(|value| value.is_nan())).then(|| DVector::from_column_slice(bend))
         };
-        if rows < 0.0 {
+        if first < 0.0 {
             return None;
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a count, written above"
-        )]
-        let rows = rows as usize;
         Some(Normal {
             square: DMatrix::from_column_slice(coordinates, coordinates, square),
             slope: DVector::from_column_slice(slope),
-            rows,
             bends: core::array::from_fn(bend),
         })
     }
@@ -121,7 +112,7 @@ pub(in crate::identify) struct Extended {
     /// Sum of r^2.
     pub squares: f64,
     /// Samples that entered.
-    pub rows: usize,
+    rows: usize,
     /// Coordinates without the directions.
     count: usize,
 }

@@ -79,14 +79,13 @@ impl LocalRefinement<'_> {
 
     /// Beginnings of the profiles, two for each.
     fn chains(&self, minimum: &ProfilePoint, wanted: &[(usize, f64)]) -> Option<Vec<Chain>> {
-        let normal =
-            self.records.normal(&minimum.place, minimum.costs.creep_weights, 1.0, self.stop)?;
+        let normal = self.records.normal(&minimum.place, minimum.costs.creep_weights, self.stop)?;
         let factor = self.records.problem().relations.factor(&self.records.theta(&minimum.place));
         let rms = minimum.costs.rms / factor;
-        let mean_square = rms * rms;
+        let squares = rms * rms * index(self.records.samples());
         let both = |&(coordinate, threshold): &(usize, f64)| {
             let (curvature, along) = Self::curvature(&normal, coordinate);
-            let foretold = (threshold * mean_square * index(normal.rows) / curvature).sqrt();
+            let foretold = (threshold * squares / curvature).sqrt();
             [-1.0, 1.0].map(|way| {
                 let begin = (foretold, along.clone());
                 Chain::new((coordinate, way), threshold, minimum.clone(), begin)

@@ -91,4 +91,12 @@ impl LocalRefinement<'_> {
         });
         Ok(found.into_iter().flatten().collect())
     }
+
+    /// Samples less what was fitted to them, with an offset of each record, and the size of its drift.
+    fn freedom(&self, count: usize) -> f64 {
+        let own =
+            |problem: &Problem| usize::from(problem.offset) + usize::from(problem.has_drift());
+        let fitted = count + self.records.problems().map(own).sum::<usize>();
+        index(self.records.samples().saturating_sub(fitted).max(1))
+    }
 }
