@@ -131,6 +131,38 @@ def test_a_mass_that_the_record_does_not_show_has_an_upper_limit_only() -> None:
     assert not narrow.parameters["mass"].determined
 
 
+def test_the_slow_record_of_the_paper_limits_ratios_of_forces_but_no_mass() -> None:
+    """Xu and Li 2010, section 3: 0.25 Hz, where inertia is some 1e-6 of the force of the spring."""
+    stage = pt.DahlStage.xu_li_2010()
+    u = 37.5 - 37.5 * np.cos(2.0 * np.pi * 0.25 * TIME)
+    noise = 50e-9 * np.random.default_rng(3).standard_normal(u.size)
+    data = pt.Dataset(u=u, y=stage.simulate(u, DT).x + noise, dt=DT)
+
+    def of(scale: float) -> dict[str, Any]:
+        """Fit with the stiffness held at a multiple of the true one."""
+        known = {name: getattr(stage, name) for name in ("a1", "a2")}
+        fit = pt.identify(
+            data,
+            "dahl",
+            parameters={
+                **known,
+                "stiffness": scale * stage.stiffness,
+                "mass": pt.Parameter(bounds=(1e-3 * scale * stage.mass, scale * stage.mass)),
+            },
+            history="virgin",
+            method=ONE,
+        )
+        return dict(fit.confidence().parameters)
+
+    once, twice = of(1.0), of(2.0)
+    assert once["mass"].shape == "flat"
+    for name in ("b1", "piezo_coefficient"):
+        assert once[name].shape == "bounded"
+        ends = 2.0 * np.array(once[name].interval)
+        width = ends[1] - ends[0]
+        assert np.allclose(ends, twice[name].interval, rtol=0.0, atol=0.05 * width)
+
+
 def test_a_drive_that_repeats_gives_two_minima_of_a_delay() -> None:
     u = 40.0 - 38.0 * np.cos(2.0 * np.pi * TIME)
     before = np.tile(u[:500], 8)
