@@ -19,18 +19,24 @@ from cells import measured
 from noises import NOISES, RICHER, seed_of
 from truths import CASES
 
+# Least share of the records in which a value has an interval, to be listed.
+OFTEN = 0.2
+
 
 def mean(cell: dict[str, Any], what: str) -> float:
-    """Mean over the values of a cell [%]."""
-    return 100.0 * float(np.mean([value[what] for value in cell["values"].values()]))
+    """Share of all intervals of a cell [%]."""
+    values = cell["values"].values()
+    given = [value["given"] for value in values]
+    return 100.0 * float(np.average([value[what] for value in values], weights=given))
 
 
 def line(cell: dict[str, Any]) -> str:
     """Row of the table of a cell."""
     values = cell["values"]
-    lowest = min(values, key=lambda name: values[name]["covered"])
-    ratios = [value["ratio"] for value in values.values()]
-    bounded = [f"{n} {100 * k / cell['records']:.0f} %" for n, k in cell["on a bound"].items()]
+    often = {name: value for name, value in values.items() if value["given"] >= OFTEN}
+    lowest = min(often, key=lambda name: often[name]["covered"])
+    ratios = [value["ratio"] for value in often.values()]
+    without = [f"{n} {100 * (1 - v['given']):.0f}" for n, v in values.items() if v["given"] < 1.0]
     each = (
         cell["case"],
         cell["noise"],
@@ -39,7 +45,7 @@ def line(cell: dict[str, Any]) -> str:
         f"{lowest} {100 * values[lowest]['covered']:.1f}",
         f"{np.median(ratios):.2f}",
         f"{min(ratios):.2f} to {max(ratios):.2f}",
-        ", ".join(bounded),
+        ", ".join(without),
         str(seed_of(cell["case"], cell["noise"], cell["seed"])),
     )
     return f"| {' | '.join(each)} |"
@@ -71,7 +77,7 @@ def table(cells: list[dict[str, Any]]) -> str:
     richer = [cell for cell in cells if cell["noise"] == RICHER]
     head = (
         "| stage | noise | covered [%] | independent [%] | least [%] | stated / actual | of values "
-        "| on a bound | seed |"
+        "| no interval [%] | seed |"
     )
     rows = [head, "| --- " * 9 + "|", *(line(cell) for cell in plain)]
     if richer:

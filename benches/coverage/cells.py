@@ -46,15 +46,8 @@ def measured(case: str, noise: str, records: int, seed: int = 1) -> dict[str, An
         "seed": seed,
         "stated": sum(fit.covariance is not None for fit in fits),
         "values": values,
-        "on a bound": on_bound(fits),
     }
     return cell | (told(fits) if richer else {})
-
-
-def on_bound(fits: list[Any]) -> dict[str, int]:
-    """Records whose fit has a value on a bound."""
-    bounded = Counter(n for fit in fits for n, p in fit.parameters.items() if p.at_bound)
-    return dict(bounded)
 
 
 def judged(fits: list[Any], truth: Any, aim: Any) -> dict[str, dict[str, float]]:

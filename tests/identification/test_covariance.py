@@ -41,42 +41,6 @@ def correlated(rng: np.random.Generator, count: int, pole: float, size: float) -
     return noise[2000:]
 
 
-def coverage(u: np.ndarray, pole: float, records: int) -> tuple[float, float]:
-    """Shares of intervals of 95 % that cover, and that would if noise were independent."""
-    rng = np.random.default_rng(3)
-    clean = STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x
-    hits, without = [], []
-    truth = np.array([STAGE.linear, *STAGE.weights])
-    for _ in range(records):
-        log = pt.Dataset(u=u, y=clean + correlated(rng, u.size, pole, 50e-9), dt=DT)
-        fit = pt.identify(log, "prandtl-ishlinskii", method=METHOD, drift=False, history="virgin")
-        certainty = certainty_of(fit)
-        intervals = np.array([certainty.interval(name) for name in certainty.names])
-        hits.append((intervals[:, 0] < truth) & (truth < intervals[:, 1]))
-        without.append(np.abs(certainty.values - truth) < 1.96 * certainty.independent)
-    return float(np.mean(hits)), float(np.mean(without))
-
-
-def test_intervals_cover_under_white_noise() -> None:
-    share, without = coverage(nested(), 0.0, 60)
-    assert 0.9 < share < 0.99
-    assert abs(share - without) < 0.03
-
-
-def test_intervals_cover_under_correlated_noise() -> None:
-    share, without = coverage(nested(), 0.95, 60)
-    assert share > 0.89
-    # What independence would say covers less than half of the time.
-    assert without < 0.55
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("pole", [0.0, 0.8, 0.95])
-def test_intervals_cover_over_200_records(pole: float) -> None:
-    share, _ = coverage(nested(), pole, 200)
-    assert 0.92 < share < 0.98
-
-
 @pytest.mark.slow
 def test_an_interval_covers_where_the_shortest_lag_was_taken() -> None:
     stage = pt.FirstOrderDahlStage(

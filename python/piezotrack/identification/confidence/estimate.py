@@ -13,7 +13,7 @@ from ... import _core
 from ...errors import DataError, PiezotrackError
 from ..fitted.covariance import Covariance, NoiseShares
 from ..solve.search import details_of
-from ..solve.selection import period_of
+from ..solve.selection import SAME_PERIOD, period_of
 from .sensitivity import DELAY, Value, fitted_values, gradient, sensitivity
 
 if TYPE_CHECKING:
@@ -267,6 +267,21 @@ class _Linear:
         )
 
 
+def _period(data: Dataset) -> int | None:
+    """Period of a drive that repeats, be it of several amplitudes."""
+    period = period_of(data)
+    if period is not None:
+        return period
+    u = data.u
+    turns = _core.turns(u, 0.5 * float(np.ptp(u)))
+    near = SAME_PERIOD * float(np.std(u))
+    for turn in turns[2::2]:
+        for after in (turn - turns[0] - 1, turn - turns[0], turn - turns[0] + 1):
+            if after * PERIODS <= u.size and float(np.std(u[after:] - u[:-after])) <= near:
+                return int(after)
+    return None
+
+
 def without_repeated(residual: Array, data: Dataset) -> tuple[Array, NoiseShares | None]:
     """Return the noise of a residual: what does not repeat with the drive; and both shares.
 
@@ -284,7 +299,7 @@ def without_repeated(residual: Array, data: Dataset) -> tuple[Array, NoiseShares
     shares : NoiseShares or None
         Model error and noise, where there are three or more.
     """
-    period = period_of(data)
+    period = _period(data)
     if period is None or residual.size != data.u.size:
         return residual, None
     count = residual.size // period
