@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 from noises import RICHER, noise_of, seed_of
-from truths import CASES, motion, with_creep
-
 from piezotrack.identification.confidence.residual import residual_of
+from truths import CASES, motion, with_creep
 
 # Parts of a drive that repeats, which tells model error from noise.
 TIMES = 4

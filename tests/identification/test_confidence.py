@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from piezotrack.identification import Identification
-    from piezotrack.identification.fitted.intervals.confidence import Confidence
+    from piezotrack.identification.fitted.certainty.confidence import Confidence
 
 DT = 2e-3
 TIME = np.arange(0.0, 4.0, DT)

@@ -11,7 +11,7 @@ import piezotrack as pt
 from piezotrack.errors import ParameterError
 
 if TYPE_CHECKING:
-    from piezotrack.identification.fitted.covariance import Covariance
+    from piezotrack.identification.fitted.certainty.covariance import Covariance
 
 DT = 4e-3
 THRESHOLDS = (5.0, 15.0, 30.0)

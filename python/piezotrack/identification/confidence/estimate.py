@@ -11,9 +11,10 @@ import numpy as np
 
 from ... import _core
 from ...errors import DataError, PiezotrackError
-from ..fitted.covariance import Covariance, NoiseShares
+from ..fitted.certainty.covariance import Covariance, NoiseShares
 from ..solve.search import details_of
 from ..solve.selection import SAME_PERIOD, period_of
+from .held_out import held_out
 from .sensitivity import DELAY, Value, fitted_values, gradient, sensitivity
 
 if TYPE_CHECKING:
@@ -172,9 +173,10 @@ def covariance_of(
     if not values:
         raise DataError("no value was fitted: expected one or more")
     sizes = _sizes(model, values)
+    at = [sensitivity(model, data, values) for data, _ in records]
     linear = [
-        _Linear(sensitivity(model, data, values), data, weight, sizes, noise)
-        for data, weight in records
+        _Linear(one, data, weight, sizes, noise)
+        for one, (data, weight) in zip(at, records, strict=True)
     ]
     # Least squares end within 0.3 % of the least cost.
     aside = getattr(model, "lags", None) is not None and model.model.info.searched
@@ -204,6 +206,7 @@ def covariance_of(
         to_least_cost=sizes * (np.array(steps) if aside else 0.0),
         samples=sum(record.samples for record in linear),
         orders=tuple(orders),
+        predicted=held_out(model, records, at).quantile(LEVEL),
         shares=linear[0].shares,
     )
 

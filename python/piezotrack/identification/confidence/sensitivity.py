@@ -27,6 +27,7 @@ __all__ = [
     "DELAY",
     "Sensitivity",
     "Value",
+    "changes",
     "fitted_values",
     "free_values",
     "gradient",
@@ -275,20 +276,51 @@ def sensitivity(model: IdentifiedModel, data: Dataset, values: list[Value]) -> S
         Of the readings that count.
     """
     record = _Linearised(model, data)
-    sizes = [_step(value, model, data) for value in values]
-    columns = [record.column(value, size) for value, size in zip(values, sizes, strict=True)]
-    shape = (len(values), record.residual.size)
-    nuisance = record.nuisance()
+    count, nuisance = record.residual.size, record.nuisance()
     return Sensitivity(
-        columns=np.array(columns).reshape(shape),
-        nuisance=np.array(list(nuisance.values())).reshape(-1, shape[1]),
+        columns=changes(model, values, record.begun, data.dt).reshape(-1, count),
+        nuisance=np.array(list(nuisance.values())).reshape(-1, count),
         alone=tuple(nuisance),
         residual=record.residual,
     )
 
 
-def _step(value: Value, model: IdentifiedModel, data: Dataset) -> float:
-    return LATER * data.dt if value.parameter == DELAY else STEP * abs(value.of(model))
+def changes(
+    model: IdentifiedModel,
+    values: list[Value],
+    motion: Callable[[IdentifiedModel], Array],
+    dt: float,
+) -> Array:
+    """Differentiate a motion by values of an identified model, by central differences.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+    values : list of Value
+        What is moved.
+    motion : callable
+        The motion of a model beside it [m], shape (n,).
+    dt : float
+        Sampling interval [s].
+
+    Returns
+    -------
+    ndarray, shape (p, n)
+        Change with each value, in the unit of the value [m/...]; 0 where there is no such stage
+        beside it.
+    """
+    columns = []
+    for value in values:
+        size = LATER * dt if value.parameter == DELAY else STEP * abs(value.of(model))
+        for ways in ((1.0, -1.0), (1.0, 0.0), (0.0, -1.0)):
+            up, down = (moved(model, [value], np.array([size * way])) for way in ways)
+            if up is not None and down is not None:
+                columns.append((motion(up) - motion(down)) / (size * (ways[0] - ways[1])))
+                break
+        else:
+            columns.append(np.zeros_like(motion(model)))
+    return np.array(columns)
 
 
 class _Linearised:
@@ -356,14 +388,9 @@ class _Linearised:
         up, down = (self._counted(replace(base, records=all_), self.start.state) for all_ in at)
         return np.asarray((up - down) / (2.0 * step))
 
-    def column(self, value: Value, size: float) -> Array:
-        """Change of the displacement with a value [m/...]."""
-        for ways in ((1.0, -1.0), (1.0, 0.0), (0.0, -1.0)):
-            models = [moved(self.model, [value], np.array([size * way])) for way in ways]
-            if None not in models:
-                up, down = (self._counted(one, self._begun(one)) for one in models if one)
-                return np.asarray((up - down) / (size * (ways[0] - ways[1])))
-        return np.zeros(self.residual.size)
+    def begun(self, model: IdentifiedModel) -> Array:
+        """Return the reading of a model that begins as the record does [m]."""
+        return self._counted(model, self._begun(model))
 
     def _counted(self, model: IdentifiedModel, state: StageState) -> Array:
         return np.asarray(self.data.counted(self._reading(model, state)))

@@ -20,7 +20,7 @@ from ...data.resampling import interpolated
 from ...errors import ParameterError, ShapeError
 from ...stages.delayed_reading import delayed_reading
 from ...stages.slow_loop import SlowLoop
-from .covariance import covariance_entry
+from .certainty.covariance import covariance_entry
 from .drift import drift_entry
 from .fitted_record import record_entries, record_of
 from .model_entries import (
@@ -46,10 +46,11 @@ if TYPE_CHECKING:
     from ...data.dataset import Hold
     from ...stages.inverse import Inverse
     from ...stages.motion import Response, StageState
-    from .covariance import Covariance
+    from .certainty.confidence import Confidence
+    from .certainty.covariance import Covariance
+    from .certainty.prediction_band import PredictionBand
     from .drift import Drift
     from .fitted_record import FittedRecord
-    from .intervals.confidence import Confidence
     from .start import History, Start
 
     Array = NDArray[np.float64]
@@ -105,6 +106,7 @@ class IdentifiedModel(Result):
         "loop": "identification.views.plot:plot_model_loop",
         "time": "identification.views.plot:plot_model_time",
         "confidence": "identification.confidence.intervals.intervals_of:intervals_of",
+        "band": "identification.confidence.prediction_band:prediction_band",
     }
 
     # A stage of any model: each has its own parameters.
@@ -679,6 +681,55 @@ class IdentifiedModel(Result):
         """
         drawn: tuple[Axes, Axes] = self.view("time")(self, data, axes)
         return drawn
+
+    def prediction_band(
+        self,
+        u: ArrayLike | Dataset,
+        dt: float | None = None,
+        *,
+        level: float = 0.95,
+        records: Sequence[Dataset] | None = None,
+    ) -> PredictionBand:
+        """Predict the displacement under a drive, with a band in which a reading is expected.
+
+        Noise of the sensor, parameters and error of the model are kept apart; see `PredictionBand`.
+
+        Parameters
+        ----------
+        u : array_like, shape (n,), or Dataset
+            The drive [V], from rest, as that of an inverse; or a record, whose offset, drift and
+            beginning follow from its readings.
+        dt : float, optional
+            Sampling interval [s], of a drive that is no record.
+        level : float, optional
+            Probability with which a reading is in the band.
+        records : sequence of Dataset, optional
+            Records on which the errors are found, at best some that were not fitted; those of the
+            fit where not given. A model from a file has none.
+
+        Returns
+        -------
+        PredictionBand
+            The displacement and its band.
+
+        Raises
+        ------
+        ParameterError
+            `level` is not between 0 and 1, there is no record, or its drive has another unit.
+        ShapeError, DataError
+            `u` is no drive, or has fewer than 8 samples.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:13.0]
+        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+        >>> band = fit.prediction_band(log.u - log.u[0], log.dt)
+        >>> bool(band.noise.max() < band.half.max() < 0.5e-6)
+        True
+        """
+        predicted: PredictionBand = self.view("band")(self, u, dt, level=level, records=records)
+        return predicted
 
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.

@@ -11,7 +11,7 @@ from ..._support.files.json_text import number_pair, object_of, parse_json, text
 from ..._support.units import of_drive
 from ...errors import DataError, ParameterError, PiezotrackError
 from ...stages.registry import model_named, stage_class
-from .covariance import covariance_of_file
+from .certainty.covariance import covariance_of_file
 from .drift import drift_of
 from .fitted_record import records_of_file
 from .identified_model import IdentifiedModel

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ....errors import DataError
-from ...fitted.covariance import Interval
-from ...fitted.intervals.confidence import Confidence, ParameterInterval
+from ...fitted.certainty.confidence import Confidence, ParameterInterval
+from ...fitted.certainty.covariance import Interval
 from ..estimate import without_repeated
 from .searched_fit import OF_SHORTEST_LAG
 

@@ -13,8 +13,8 @@ from .profile import profile_confidence
 from .searched_fit import SearchedFit
 
 if TYPE_CHECKING:
+    from ...fitted.certainty.confidence import Confidence
     from ...fitted.identified_model import IdentifiedModel
-    from ...fitted.intervals.confidence import Confidence
 
 __all__ = ["intervals_of"]
 

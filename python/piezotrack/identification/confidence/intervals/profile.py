@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...fitted.covariance import Interval
-from ...fitted.intervals.confidence import Confidence, ParameterInterval
+from ...fitted.certainty.confidence import Confidence, ParameterInterval
+from ...fitted.certainty.covariance import Interval
 from .searched_fit import OF_SHORTEST_LAG
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ...fitted.intervals.confidence import Shape
+    from ...fitted.certainty.confidence import Shape
     from .searched_fit import SearchedFit
 
     Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from .... import _core
 from ....data.checks.fast_drive import is_fast
 from ....errors import DataError, ParameterError, PiezotrackError
-from ...fitted.intervals.confidence import LowerMinimum
+from ...fitted.certainty.confidence import LowerMinimum
 from ...fitted.start import start_after, start_at_jump
 from ...problem.parameter import Parameter
 from ...problem.problem import Problem
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....data.dataset import Dataset
-    from ...fitted.covariance import Covariance
+    from ...fitted.certainty.covariance import Covariance
     from ...fitted.estimates import Estimate
     from ...fitted.fitted_record import FittedRecord
     from ...fitted.identification import Identification

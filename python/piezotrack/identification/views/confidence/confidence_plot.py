@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from ...fitted.intervals.confidence import Confidence, ParameterInterval
+    from ...fitted.certainty.confidence import Confidence, ParameterInterval
 
 __all__ = ["plot_confidence"]
 

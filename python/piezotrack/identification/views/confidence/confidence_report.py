@@ -9,7 +9,7 @@ from ...._support.display.table import Column, Table
 from ...._support.units import length_text
 
 if TYPE_CHECKING:
-    from ...fitted.intervals.confidence import Confidence, ParameterInterval
+    from ...fitted.certainty.confidence import Confidence, ParameterInterval
 
 __all__ = ["confidence_text", "limits_text"]
 

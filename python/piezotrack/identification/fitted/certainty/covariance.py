@@ -9,17 +9,24 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ... import _core
-from ..._support.files.json_text import object_of
-from ..._support.messages import quoted
-from ...errors import ParameterError
+from .... import _core
+from ...._support.files.json_text import object_of
+from ...._support.messages import quoted
+from ....errors import ParameterError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["Covariance", "Interval", "NoiseShares", "covariance_entry", "covariance_of_file"]
+__all__ = [
+    "Covariance",
+    "Interval",
+    "NoiseShares",
+    "covariance_entry",
+    "covariance_of_file",
+    "normal_reach",
+]
 
 # Correlation from which on a pair of values is named.
 CORRELATED = 0.95
@@ -103,6 +110,9 @@ class Covariance:
         Samples of the records.
     orders : tuple of int
         Order of the autoregression of each record.
+    predicted : float
+        Half width in which 95 % of the errors are expected on a cycle like those of the records
+        that was not fitted, as `PredictionBand` has it by amplitude and rate [m].
     shares : NoiseShares or None
         Model error and noise of the first record, where its drive repeats three times or more.
 
@@ -136,6 +146,7 @@ class Covariance:
     to_least_cost: Array
     samples: int
     orders: tuple[int, ...]
+    predicted: float
     shares: NoiseShares | None = None
 
     @property
@@ -215,7 +226,7 @@ class Covariance:
             There is no such value, or `level` is no share.
         """
         place = self._place(name)
-        reach = float(self.widening[place] * _normal(level) * self.deviations[place])
+        reach = float(self.widening[place] * normal_reach(level) * self.deviations[place])
         ends = float(self.values[place]) + np.array([0.0, self.to_least_cost[place]])
         return Interval(float(ends.min()) - reach, float(ends.max()) + reach)
 
@@ -239,7 +250,7 @@ class Covariance:
         ParameterError
             `level` is no share.
         """
-        normal = _normal(level)
+        normal = normal_reach(level)
         variances = (gradient**2) * np.diag(self.matrix)
         if not self.determined[variances > 0.0].all():
             return math.inf
@@ -254,8 +265,24 @@ class Covariance:
         return self.names.index(name)
 
 
-def _normal(level: float) -> float:
-    """Quantile of a normal deviation's size."""
+def normal_reach(level: float) -> float:
+    """Return what the size of a standard normal deviation stays below with a probability.
+
+    Parameters
+    ----------
+    level : float
+        The probability, between 0 and 1.
+
+    Returns
+    -------
+    float
+        1.96 for 95 %.
+
+    Raises
+    ------
+    ParameterError
+        `level` is no such number.
+    """
     share = _core.as_number("level", level)
     if not 0.0 < share < 1.0:
         raise ParameterError("level", share, "a number between 0 and 1")
@@ -283,6 +310,7 @@ def covariance_entry(covariance: Covariance | None) -> dict[str, Any]:
         **{name: getattr(covariance, name).tolist() for name in LISTS},
         "samples": covariance.samples,
         "orders": list(covariance.orders),
+        "predicted": {"value": covariance.predicted, "unit": "m"},
     }
     if covariance.shares is not None:
         parts = covariance.shares._asdict().items()
@@ -335,6 +363,7 @@ def covariance_of_file(entry: Any) -> Covariance | None:
         **{**lists, "determined": lists["determined"] != 0.0},
         samples=_core.as_count("covariance: samples", found["samples"]),
         orders=tuple(_core.as_count("covariance: orders", order) for order in found["orders"]),
+        predicted=_core.as_number("covariance: predicted", found["predicted"]["value"]),
         shares=NoiseShares(**shares) if shares else None,
     )
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ..covariance import Interval
+    from .covariance import Interval
 
     Array = NDArray[np.float64]
 

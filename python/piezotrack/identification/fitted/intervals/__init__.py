@@ -1,1 +1,0 @@
-"""Intervals of confidence from profiles and refits."""
