@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from noises import RICHER, noise_of, seed_of
-from piezotrack.identification.confidence.residual import residual_of
+from piezotrack.identification import residual_of
 from truths import CASES, motion, with_creep
 
 # Parts of a drive that repeats, which tells model error from noise.
