@@ -21,6 +21,7 @@ from truths import CASES
 
 # Least share of the records in which a value has an interval, to be listed.
 OFTEN = 0.2
+RECORDS = 200
 
 
 def mean(cell: dict[str, Any], what: str) -> float:
@@ -71,6 +72,25 @@ def richer_line(cell: dict[str, Any]) -> str:
     return f"| {' | '.join(each)} |"
 
 
+def overview(cells: list[dict[str, Any]]) -> list[str]:
+    """Rows of a table by stage and noise: covered, independent, stated over actual deviation."""
+    noises = [noise for noise in NOISES if noise != RICHER]
+    of = {(cell["case"], cell["noise"]): cell for cell in cells}
+
+    def entry(case: str, noise: str) -> str:
+        cell = of.get((case, noise))
+        if cell is None:
+            return ""
+        ratios = [v["ratio"] for v in cell["values"].values() if v["given"] >= OFTEN]
+        few = "" if cell["records"] == RECORDS else f", {cell['records']} records"
+        covered, independent = mean(cell, "covered"), mean(cell, "independent")
+        return f"{covered:.1f} ({independent:.0f}; {np.median(ratios):.2f}{few})"
+
+    cases = [case for case in CASES if any((case, noise) in of for noise in noises)]
+    rows = [f"| {case} | {' | '.join(entry(case, noise) for noise in noises)} |" for case in cases]
+    return [f"| stage | {' | '.join(noises)} |", "| --- " * (1 + len(noises)) + "|", *rows]
+
+
 def table(cells: list[dict[str, Any]]) -> str:
     """Tables of all cells, in Markdown."""
     plain = [cell for cell in cells if cell["noise"] != RICHER]
@@ -79,7 +99,7 @@ def table(cells: list[dict[str, Any]]) -> str:
         "| stage | noise | covered [%] | independent [%] | least [%] | stated / actual | of values "
         "| no interval [%] | seed |"
     )
-    rows = [head, "| --- " * 9 + "|", *(line(cell) for cell in plain)]
+    rows = [*overview(plain), "", head, "| --- " * 9 + "|", *(line(cell) for cell in plain)]
     if richer:
         head = (
             "| stage | true values covered [%] | values without noise [%] "
@@ -93,7 +113,7 @@ def table(cells: list[dict[str, Any]]) -> str:
 def main() -> None:
     """Measure the cells and write their table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--records", type=int, default=200)
+    parser.add_argument("--records", type=int, default=RECORDS)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--cases", default=";".join(CASES))
     parser.add_argument("--noises", default=";".join(NOISES))
@@ -113,7 +133,9 @@ def main() -> None:
             kept.parent.mkdir(parents=True, exist_ok=True)
             kept.write_text(json.dumps(cells, indent=1))
     order = {name: k for k, name in enumerate(CASES)}
-    listed = sorted(cells.values(), key=lambda cell: (order[cell["case"]], cell["noise"]))
+    listed = sorted(
+        cells.values(), key=lambda cell: (order[cell["case"]], NOISES.index(cell["noise"]))
+    )
     options.out.with_suffix(".md").write_text(table(listed))
 
 
