@@ -192,7 +192,7 @@ struct Told {
     with_mass: Option<Vec<Problem>>,
 }
 
-/// What a candidate lies on; of a `polished` one first the mass is taken where the record shows it,
+/// Lags and bounds of a candidate; of a `polished` one first the mass is taken where the record shows it,
 /// else under a slow drive the least lag that fits.
 fn told_by(local: &LocalRefinement<'_>, run: &mut Outcome, polished: bool) -> Told {
     if polished && let Some((problems, polished)) = with_mass(local, &run.place, run.costs) {
