@@ -183,12 +183,13 @@ def covariance_of(
     precision = np.diag(_precision(model, values) * sizes**2).tolist()
     longest = max(record.samples for record in linear)
     short = longest <= MOST_RESAMPLED
-    rows, determined, independent, shifts, steps, resampled, orders = _core.linearised_covariance(
+    rows, determined, independent, shifts, steps, resampled, *others = _core.linearised_covariance(
         [record.thinned(MOST) for record in linear], precision, DRAWS if short else 0, SEED
     )
     if not short:
         few = [record.thinned(MOST_RESAMPLED) for record in linear]
-        *_, resampled, _ = _core.linearised_covariance(few, precision, DRAWS, SEED)
+        *_, resampled, _, _ = _core.linearised_covariance(few, precision, DRAWS, SEED)
+    orders, hidden = others
     quantiles = np.quantile(np.array(resampled), LEVEL, axis=0)
     return Covariance(
         names=tuple(str(value) for value in values),
@@ -201,6 +202,7 @@ def covariance_of(
         to_least_cost=sizes * (np.array(steps) if aside else 0.0),
         samples=sum(record.samples for record in linear),
         orders=tuple(orders),
+        hidden=np.array(hidden).reshape(-1, sizes.size) * sizes,
         predicted=held_out(model, records, at).quantile(LEVEL),
         shares=linear[0].shares,
     )

@@ -30,6 +30,8 @@ __all__ = [
 
 # Correlation from which on a pair of values is named.
 CORRELATED = 0.95
+# Share of its parts from which on a change without effect on the records moves a quantity.
+UNSEEN = 1e-3
 # Lists of a covariance with an entry for each value, as a model file has them.
 LISTS = ("values", "determined", "independent", "widening", "shifts", "to_least_cost")
 
@@ -100,6 +102,8 @@ class Covariance:
         Samples of the records.
     orders : tuple of int
         Order of the autoregression of each record.
+    hidden : ndarray, shape (m, p)
+        Changes of the values without effect on the records, that of one value its own size [SI].
     predicted : float
         Half width in which 95 % of the errors are expected on a cycle like those of the records
         that was not fitted, as `PredictionBand` has it by amplitude and rate [m].
@@ -135,6 +139,7 @@ class Covariance:
     to_least_cost: Array
     samples: int
     orders: tuple[int, ...]
+    hidden: Array
     predicted: float
     shares: NoiseShares | None = None
 
@@ -241,7 +246,9 @@ class Covariance:
         """
         normal = normal_reach(level)
         variances = (gradient**2) * np.diag(self.matrix)
-        if not self.determined[variances > 0.0].all():
+        if np.any(
+            np.abs(self.hidden @ gradient) > UNSEEN * (np.abs(self.hidden) @ np.abs(gradient))
+        ):
             return math.inf
         whole = float(variances.sum())
         widening = float(variances @ self.widening) / whole if whole > 0.0 else 1.0
@@ -299,6 +306,7 @@ def covariance_entry(covariance: Covariance | None) -> dict[str, Any]:
         **{name: getattr(covariance, name).tolist() for name in LISTS},
         "samples": covariance.samples,
         "orders": list(covariance.orders),
+        "hidden": covariance.hidden.tolist(),
         "predicted": {"value": covariance.predicted, "unit": "m"},
     }
     if covariance.shares is not None:
@@ -352,6 +360,7 @@ def covariance_of_file(entry: Any) -> Covariance | None:
         **{**lists, "determined": lists["determined"] != 0.0},
         samples=_core.as_count("covariance: samples", found["samples"]),
         orders=tuple(_core.as_count("covariance: orders", order) for order in found["orders"]),
+        hidden=_numbers("hidden", found["hidden"]).reshape(-1, len(names)),
         predicted=_core.as_number("covariance: predicted", found["predicted"]["value"]),
         shares=NoiseShares(**shares) if shares else None,
     )
@@ -360,6 +369,9 @@ def covariance_of_file(entry: Any) -> Covariance | None:
 def _numbers(name: str, values: Any) -> Array:
     """Take a list of numbers of a file; what is not finite is null there."""
     numbers = np.array(values, dtype=np.float64)
-    if name in ("matrix", "values", "widening", "to_least_cost") and not np.isfinite(numbers).all():
+    if (
+        name in ("matrix", "hidden", "values", "widening", "to_least_cost")
+        and not np.isfinite(numbers).all()
+    ):
         raise ParameterError(f"covariance: {name}", "null", "finite numbers", verb="has")
     return numbers
