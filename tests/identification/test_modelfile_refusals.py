@@ -128,6 +128,7 @@ COVARIANCE: dict[str, Any] = {
     "values": [0.2, 1.0],
     "determined": [True, True],
     "independent": [1.0, 1.0],
+    "factors": [1.0, 1.0],
     "widening": [1.0, 1.0],
     "shifts": [[0.0, 1.0], [0.0, 1.0]],
     "to_least_cost": [0.0, 0.0],

@@ -29,6 +29,9 @@ from .experiments.step_response import StepResult as StepResult
 from .experiments.step_response import StepTrace as StepTrace
 from .experiments.step_response import identify_step as identify_step
 from .fit import identify as identify
+from .fitted.certainty.confidence import Confidence as Confidence
+from .fitted.certainty.confidence import LowerMinimum as LowerMinimum
+from .fitted.certainty.confidence import ParameterInterval as ParameterInterval
 from .fitted.estimates import Constraint as Constraint
 from .fitted.estimates import Estimate as Estimate
 from .fitted.estimates import LagRange as LagRange

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["covariance_of", "with_covariance"]
+__all__ = ["covariance_of", "with_covariance", "without_repeated"]
 
 # Most samples of a record; of more, means of neighbours.
 MOST, MOST_RESAMPLED = 2**16, 2**12
@@ -183,20 +183,25 @@ def covariance_of(
     precision = np.diag(_precision(model, values) * sizes**2).tolist()
     longest = max(record.samples for record in linear)
     short = longest <= MOST_RESAMPLED
-    rows, determined, independent, shifts, steps, resampled, *others = _core.linearised_covariance(
+    found = _core.linearised_covariance(
         [record.thinned(MOST) for record in linear], precision, DRAWS if short else 0, SEED
     )
+    rows, determined, independent, shifts, steps, resampled, orders, hidden = found
     if not short:
         few = [record.thinned(MOST_RESAMPLED) for record in linear]
         *_, resampled, _, _ = _core.linearised_covariance(few, precision, DRAWS, SEED)
-    orders, hidden = others
     quantiles = np.quantile(np.array(resampled), LEVEL, axis=0)
+    # Independent residuals have the variance of all that is left, not of the noise alone.
+    powers = [sum(one.power_of(part) for one in linear) for part in ("noise", "residual")]
+    with np.errstate(all="ignore"):
+        factors = np.diag(np.array(rows)) / np.array(independent) * powers[0] / powers[1]
     return Covariance(
         names=tuple(str(value) for value in values),
         values=np.array([value.of(model) for value in values]),
         matrix=np.array(rows) * np.outer(sizes, sizes),
         determined=np.array(determined),
         independent=np.sqrt(np.array(independent)) * sizes,
+        factors=np.where(np.isfinite(factors), factors, 1.0),
         widening=np.maximum(quantiles / NormalDist().inv_cdf(0.5 + 0.5 * LEVEL), 1.0),
         shifts=np.array(shifts) * sizes[:, None],
         to_least_cost=sizes * (np.array(steps) if aside else 0.0),
@@ -235,13 +240,18 @@ class _Linear:
     ) -> None:
         self.columns, self.nuisance = linear.columns * sizes[:, None], linear.nuisance
         self.residual, self.weight = linear.residual, weight
-        self.noise, self.shares = _without_repeated(linear.residual, data)
+        self.noise, self.shares = without_repeated(linear.residual, data)
         if noise == "residual":
             self.noise = linear.residual
 
     @property
     def samples(self) -> int:
         return self.residual.size
+
+    def power_of(self, part: Literal["noise", "residual"]) -> float:
+        """Weighted sum of squares of a part."""
+        values = self.noise if part == "noise" else self.residual
+        return self.weight * float(values @ values)
 
     def thinned(self, most: int) -> tuple[list[Array], list[Array], Array, Array, float]:
         """Means of neighbours, so many samples at most."""
@@ -277,8 +287,23 @@ def _period(data: Dataset) -> int | None:
     return None
 
 
-def _without_repeated(residual: Array, data: Dataset) -> tuple[Array, NoiseShares | None]:
-    """Noise of a residual: what does not repeat with the drive; and both shares."""
+def without_repeated(residual: Array, data: Dataset) -> tuple[Array, NoiseShares | None]:
+    """Return the noise of a residual: what does not repeat with the drive; and both shares.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+        Measured less simulated displacement, of the readings that count [m].
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    noise : ndarray, shape (n,)
+        The noise [m]; all of the residual where there are fewer than three whole periods.
+    shares : NoiseShares or None
+        Model error and noise, where there are three or more.
+    """
     period = _period(data)
     if period is None or residual.size != data.u.size:
         return residual, None

@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from ...data.dataset import Hold
     from ...stages.inverse import Inverse
     from ...stages.motion import Response, StageState
+    from .certainty.confidence import Confidence
     from .certainty.covariance import Covariance
     from .certainty.prediction_band import PredictionBand
     from .drift import Drift
@@ -104,6 +105,7 @@ class IdentifiedModel(Result):
         "plot": "identification.views.plot:plot_model",
         "loop": "identification.views.plot:plot_model_loop",
         "time": "identification.views.plot:plot_model_time",
+        "confidence": "identification.confidence.intervals.intervals_of:intervals_of",
         "band": "identification.confidence.prediction_band:prediction_band",
     }
 
@@ -543,6 +545,48 @@ class IdentifiedModel(Result):
                 raise ParameterError("offset", shift, f"'own', or m below {LARGEST:g}")
             return shift
         return float(np.mean(data.counted(data.y - x))) if self._fits_offset(data) else 0.0
+
+    def confidence(
+        self, level: float = 0.95, *, method: Literal["profile", "bootstrap"] = "profile"
+    ) -> Confidence:
+        """Return intervals of confidence that hold where the cost is not quadratic too.
+
+        `Identification.covariance`, which every fit has, is exact for small deviations. A profile
+        shows whether the records limit a parameter at all, and on which side. Refits check both:
+        they take the model and the resampled noise for true.
+
+        Parameters
+        ----------
+        level : float, optional
+            Between 0 and 1.
+        method : {"profile", "bootstrap"}, optional
+            Profiles of the cost, or 200 refits of resampled noise, the same in every call.
+
+        Returns
+        -------
+        Confidence
+            The intervals, with a lower minimum where a profile met one.
+
+        Raises
+        ------
+        ParameterError
+            `level` or `method` is none of these, the model was read from a file and has no record,
+            or its parameters were not searched.
+        DataError
+            The record is too short.
+        NumericalError
+            The fit leaves no residual.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:8.0]
+        >>> fit = pt.identify(log, "first-order-dahl", method=pt.Descents(seed=1))
+        >>> fit.confidence(0.68).parameters["piezo_coefficient"].shape
+        'bounded'
+        """
+        intervals: Confidence = self.view("confidence")(self, level, method)
+        return intervals
 
     def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Loop, displacement with its error over time, and convergence of a search.

@@ -33,7 +33,15 @@ CORRELATED = 0.95
 # Share of its parts from which on a change without effect on the records moves a quantity.
 UNSEEN = 1e-3
 # Lists of a covariance with an entry for each value, as a model file has them.
-LISTS = ("values", "determined", "independent", "widening", "shifts", "to_least_cost")
+LISTS = (
+    "values",
+    "determined",
+    "independent",
+    "factors",
+    "widening",
+    "shifts",
+    "to_least_cost",
+)
 
 
 class Interval(NamedTuple):
@@ -90,6 +98,8 @@ class Covariance:
         Whether the records determine each value.
     independent : ndarray, shape (p,)
         Standard deviations for independent noise of the same size, SI.
+    factors : ndarray, shape (p,)
+        Variance of each value over that for an independent residual of the same size.
     widening : ndarray, shape (p,)
         Factor of the 95 % interval, by the bootstrap, over that of normal deviations.
     shifts : ndarray, shape (p, 2)
@@ -134,6 +144,7 @@ class Covariance:
     matrix: Array
     determined: NDArray[np.bool_]
     independent: Array
+    factors: Array
     widening: Array
     shifts: Array
     to_least_cost: Array
@@ -369,9 +380,7 @@ def covariance_of_file(entry: Any) -> Covariance | None:
 def _numbers(name: str, values: Any) -> Array:
     """Take a list of numbers of a file; what is not finite is null there."""
     numbers = np.array(values, dtype=np.float64)
-    if (
-        name in ("matrix", "hidden", "values", "widening", "to_least_cost")
-        and not np.isfinite(numbers).all()
-    ):
+    finite = name not in ("determined", "independent", "shifts")
+    if finite and not np.isfinite(numbers).all():
         raise ParameterError(f"covariance: {name}", "null", "finite numbers", verb="has")
     return numbers

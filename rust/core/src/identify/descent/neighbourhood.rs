@@ -63,7 +63,8 @@ impl Records<'_> {
         let local = |(spot, blocks): (&Spot, Option<Vec<Block>>)| {
             let blocks = blocks?;
             let extended = Extended::of(self.members(), &blocks, spot.place.len());
-            let normal = self.with_priors(&spot.place, &extended);
+            let mut normal = self.with_priors(&spot.place, &extended);
+            spot.held.into_iter().for_each(|coordinate| normal.hold(coordinate));
             Some(Neighbourhood { blocks, extended, normal })
         };
         let local: Vec<Option<Neighbourhood>> = spots.iter().zip(all).map(local).collect();

@@ -25,12 +25,23 @@ pub(in crate::identify) struct Normal {
     pub bends: [Option<DVector<f64>>; STEPS],
 }
 
+impl Normal {
+    /// Takes a coordinate out, which then stays as it is.
+    pub fn hold(&mut self, coordinate: usize) {
+        self.square.fill_row(coordinate, 0.0);
+        self.square.fill_column(coordinate, 0.0);
+        self.slope[coordinate] = 0.0;
+    }
+}
+
 /// Where normal equations are asked for.
 pub(in crate::identify) struct Spot {
     pub place: Vec<f64>,
     pub creep_weights: CreepWeights,
     /// Dampings of the steps along which the curvature is asked for.
     pub dampings: [f64; STEPS],
+    /// Coordinate that stays as it is.
+    pub held: Option<usize>,
 }
 
 /// First 1, or -1 where a neighbour could not be simulated; NaN for bends that there are not.
