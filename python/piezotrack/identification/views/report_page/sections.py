@@ -155,9 +155,13 @@ def residual(fit: Identification) -> Section:
 
     def draw(figure: Figure | SubFigure) -> None:
         judged.plot(fig=figure)
+        # The cause is in the text.
+        figure.suptitle("")
+        for axes in figure.axes:
+            axes.set_title(axes.get_title().partition(":")[0], fontsize=8)
 
     which = f" of record {worst + 1}" if len(fit.records) > 1 else ""
-    picture = Picture("residual", draw, 4.3, f"residual{which}: where it is large")
+    picture = Picture("residual", draw, 4.8, f"residual{which}: where it is large")
     return Section("Residual", (Sentences((f"Cause: {verdict(judged)}.",)), picture))
 
 
