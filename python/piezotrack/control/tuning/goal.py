@@ -87,7 +87,7 @@ class TuningSearch:
     ----------
     particles, iterations : int, optional
         Candidates that each of the four to six searches begins with, 4 or more, and by how many
-        times as many it goes on. A refinement about its best takes half as many again at most.
+        times as many it goes on. A refinement about its best takes as many again at most.
     seed : int, optional
         Seed of the searches.
     draws : int, optional

@@ -119,6 +119,7 @@ def search_at(problem: TuningProblem, dt: float) -> Solution:
     cores = [axis._core for axis in axes]
     starts = _starts(problem, axes, cores) if tasks else []
     reserve = 1.0
+    solution: Solution | None = None
     for _ in range(ROUNDS):
         outcome = _core.tune(
             problem,
@@ -127,6 +128,9 @@ def search_at(problem: TuningProblem, dt: float) -> Solution:
             tasks=tasks,
             starts=starts,
         )
+        if outcome["excess"] > 1.0 and solution is not None:
+            # Nothing keeps what is in reserve.
+            return solution
         solution = Solution(outcome, axes, [])
         if outcome["excess"] > 1.0:
             return solution
@@ -134,6 +138,7 @@ def search_at(problem: TuningProblem, dt: float) -> Solution:
         if solution.feasible:
             return solution
         reserve *= 1.0 + 1.2 * (solution.excess - 1.0)
+    assert solution is not None
     return solution
 
 

@@ -77,7 +77,7 @@ def tune(
 
     Searches from several sides evaluate controllers in closed loop with the stage, with its noise,
     quantisation, delay, jitter, saturation and creep, and make the error along the references
-    small. There are four of them, and two more where none ends within 1 % of the best; one begins
+    small. There are four of them, and two more where none ends within 2 % of the best; one begins
     with Skogestad's rule (2003, doi 10.1016/S0959-1524(02)00062-8) and with the gains from margins
     alone. Each is by differential evolution (Tanabe and Fukunaga 2014, doi
     10.1109/CEC.2014.6900380), refined by CMA-ES (Hansen 2016, arXiv 1604.00772). Every

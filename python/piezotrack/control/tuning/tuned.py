@@ -92,7 +92,7 @@ class Tuned(Result):
     history : tuple of float
         Best figure after each iteration; infinite as long as no candidate kept the margins.
     searches, agreeing : int
-        Searches from different sides, and how many of them end within 1 % of the best.
+        Searches from different sides, and how many of them end within 2 % of the best.
     """
 
     views: ClassVar[Mapping[str, str]] = {

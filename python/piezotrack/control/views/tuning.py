@@ -42,7 +42,7 @@ def tuned_text(tuned: Tuned) -> str:
         *gains,
         f"{tuned.minimised}, at {rate:.6g} Hz: {tuned.candidates} controllers evaluated, "
         f"{tuned.loops} loops simulated; {tuned.agreeing} of {tuned.searches} searches end within "
-        "1 % of the best",
+        "2 % of the best",
     ]
     if tuned.runs:
         scale, unit = _shown(tuned)

@@ -1,19 +1,19 @@
 //! A search about a place that adapts to the shape of the valley: CMA-ES.
 //!
-//! Hansen, The CMA Evolution Strategy: A Tutorial, 2016, arXiv 1604.00772, equations (38) to (49),
-//! without negative weights. What is beyond an end of the unit box is reflected.
+//! Hansen, The CMA Evolution Strategy: A Tutorial, 2016, arXiv 1604.00772, equations (38) to (53).
+//! What is beyond an end of the unit box is reflected.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::math::Draws;
 use crate::signal::index;
 
-/// Candidates of a generation: as many as lanes in a bundle.
-const CANDIDATES: usize = 16;
+/// Candidates of a generation.
+const CANDIDATES: usize = 12;
 /// Which of a run's streams it draws from.
 const STREAM: u64 = 1 << 40;
 /// Share by which the best of some generations is to improve for the search to go on.
-const LEAST_GAIN: f64 = 1e-3;
+const LEAST_GAIN: f64 = 2e-3;
 /// Widest step at which it ends, as a share of the box.
 const NARROW: f64 = 1e-4;
 
@@ -66,6 +66,11 @@ impl Adaptation {
         self.asked.iter()
     }
 
+    /// Candidates so far.
+    pub(super) fn evaluated(&self) -> usize {
+        self.evaluated
+    }
+
     /// Whether the budget is used up, or nothing is to be gained any more.
     pub(super) fn ended(&self) -> bool {
         let n = index(self.mean.len());
@@ -87,7 +92,11 @@ impl Adaptation {
                 let mut draws = Draws::at(self.seed, run, self.generation, k, CANDIDATES as u64);
                 let normals = DVector::from_vec(draws.normals(n));
                 let way = &self.basis * self.widths.component_mul(&normals);
-                self.mean.iter().zip(&way).map(|(mean, way)| inside(mean + self.step * way)).collect()
+                self.mean
+                    .iter()
+                    .zip(&way)
+                    .map(|(mean, way)| inside(mean + self.step * way))
+                    .collect()
             })
             .collect()
     }
@@ -101,11 +110,11 @@ impl Adaptation {
         let best = ranks[order[0]];
         self.history.push(self.history.last().map_or(best, |last| last.min(best)));
         let parents = self.asked.len() / 2;
-        let half = libm::log(index(parents) + 0.5);
-        let raw: Vec<f64> = (1..=parents).map(|i| half - libm::log(index(i))).collect();
-        let total: f64 = raw.iter().sum();
-        let weights: Vec<f64> = raw.iter().map(|one| one / total).collect();
-        let effective = 1.0 / weights.iter().map(|one| one * one).sum::<f64>();
+        let half = libm::log(0.5 * (index(self.asked.len()) + 1.0));
+        let raw: Vec<f64> = (1..=self.asked.len()).map(|i| half - libm::log(index(i))).collect();
+        let (good, bad) = raw.split_at(parents);
+        let total: f64 = good.iter().sum();
+        let effective = total * total / good.iter().map(|one| one * one).sum::<f64>();
         let for_path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
         let for_step = (effective + 2.0) / (n + effective + 5.0);
         let one_rank = 2.0 / ((n + 1.3) * (n + 1.3) + effective);
@@ -114,16 +123,38 @@ impl Adaptation {
         let more = libm::sqrt((effective - 1.0) / (n + 1.0)) - 1.0;
         let damping = 1.0 + 2.0 * more.max(0.0) + for_step;
         let expected = libm::sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
-        let ways: Vec<DVector<f64>> = order[..parents]
+        // What is worse makes its direction narrower, and the covariance stays positive.
+        let lost: f64 = bad.iter().sum();
+        let effective_bad = lost * lost / bad.iter().map(|one| one * one).sum::<f64>();
+        let most = (1.0 + one_rank / many)
+            .min(1.0 + 2.0 * effective_bad / (effective + 2.0))
+            .min((1.0 - one_rank - many) / (n * many));
+        let weights: Vec<f64> = good
+            .iter()
+            .map(|one| one / total)
+            .chain(bad.iter().map(|one| -most * one / lost))
+            .collect();
+        let ways: Vec<DVector<f64>> = order
             .iter()
             .map(|i| (DVector::from_column_slice(&self.asked[*i]) - &self.mean) / self.step)
             .collect();
         let mut way = DVector::zeros(self.mean.len());
-        for (weight, one) in weights.iter().zip(&ways) {
+        for (weight, one) in weights[..parents].iter().zip(&ways) {
             way += *weight * one;
         }
         self.mean += self.step * &way;
-        let white = &self.basis * (self.basis.transpose() * &way).component_div(&self.widths);
+        let whitened = |way: &DVector<f64>| -> DVector<f64> {
+            (self.basis.transpose() * way).component_div(&self.widths)
+        };
+        let white = &self.basis * whitened(&way);
+        let shares: Vec<f64> = weights
+            .iter()
+            .zip(&ways)
+            .map(|(weight, one)| {
+                let length = whitened(one).norm_squared();
+                if *weight < 0.0 { *weight * n / length.max(1e-12) } else { *weight }
+            })
+            .collect();
         self.step_path = (1.0 - for_step) * &self.step_path
             + libm::sqrt(for_step * (2.0 - for_step) * effective) * white;
         self.generation += 1;
@@ -133,11 +164,12 @@ impl Adaptation {
         let slow = length / libm::sqrt(faded) < (1.4 + 2.0 / (n + 1.0)) * expected;
         let pushed = if slow { libm::sqrt(for_path * (2.0 - for_path) * effective) } else { 0.0 };
         self.path = (1.0 - for_path) * &self.path + pushed * &way;
-        let lost = if slow { 0.0 } else { one_rank * for_path * (2.0 - for_path) };
-        self.covariance *= 1.0 - one_rank - many + lost;
+        let missed = if slow { 0.0 } else { one_rank * for_path * (2.0 - for_path) };
+        let sum: f64 = weights.iter().sum();
+        self.covariance *= 1.0 + missed - one_rank - many * sum;
         self.covariance += one_rank * &self.path * self.path.transpose();
-        for (weight, one) in weights.iter().zip(&ways) {
-            self.covariance += many * *weight * one * one.transpose();
+        for (share, one) in shares.iter().zip(&ways) {
+            self.covariance += many * *share * one * one.transpose();
         }
         self.step *= libm::exp((for_step / damping * (length / expected - 1.0)).min(1.0));
         let parts = SymmetricEigen::new(self.covariance.clone());

@@ -94,7 +94,8 @@ impl Evolution {
         self.generation += 1;
         if self.members.is_empty() {
             let pairs = trials.into_iter().zip(ranks);
-            self.members = pairs.map(|(one, rank)| Member { place: one.place, rank: *rank }).collect();
+            self.members =
+                pairs.map(|(one, rank)| Member { place: one.place, rank: *rank }).collect();
         } else {
             self.select(trials, ranks);
         }
@@ -152,7 +153,8 @@ impl Evolution {
             });
         }
         let most = ARCHIVED * self.members.len();
-        let mut draws = Draws::at(self.seed, self.run, self.generation, self.most(), self.most() + 1);
+        let mut draws =
+            Draws::at(self.seed, self.run, self.generation, self.most(), self.most() + 1);
         while self.archive.len() > most {
             self.archive.swap_remove(draws.below(self.archive.len()));
         }

@@ -228,10 +228,10 @@ impl PlantSet {
             let mut one = walk(law.len(), integrators, |k| forward(k) * law[k]);
             if let Some(learnt) = &learnt {
                 let gain = (0..law.len()).map(|k| {
-                    let closed = forward(k) / (C::new(1.0, 0.0) + forward(k) * law[k]);
-                    (learnt[k].0 * (C::new(1.0, 0.0) - learnt[k].1 * closed)).norm()
+                    let closed = over(forward(k), C::new(1.0, 0.0) + forward(k) * law[k]);
+                    (learnt[k].0 * (C::new(1.0, 0.0) - learnt[k].1 * closed)).norm_sqr()
                 });
-                one.learning.value = gain.fold(0.0, f64::max);
+                one.learning.value = libm::sqrt(gain.fold(0.0, f64::max));
             }
             let one = one.numbered_from(plant);
             out = Some(out.map_or(one, |before| before.worse(one)));
@@ -257,7 +257,7 @@ impl PlantSet {
             }
             // The whole delay turns it, and changes no size.
             let lead = late.conj().powu(to_u32(recursion.lead.min(recursion.nearest)));
-            (sum / (one - late * recursion.pole), lead * recursion.gain)
+            (over(sum, one - late * recursion.pole), lead * recursion.gain)
         });
         places.collect()
     }
@@ -288,7 +288,9 @@ fn walk(count: usize, integrators: usize, open: impl Fn(usize) -> C) -> Robustne
             let way = closed - last_closed;
             // On the line between them there is a place nearer to 0 than either.
             if dot(last_closed, way) < 0.0 && dot(closed, way) > 0.0 {
-                nearest = nearest.min(square(last_closed.re * way.im - last_closed.im * way.re) / way.norm_sqr());
+                nearest = nearest.min(
+                    square(last_closed.re * way.im - last_closed.im * way.re) / way.norm_sqr(),
+                );
             }
             let down = closed.im.is_sign_negative();
             if down != last_closed.im.is_sign_negative() {
@@ -402,9 +404,12 @@ fn of(ratio: &Ratio, delta: C) -> C {
     let at = |polynomial: &[f64]| {
         polynomial.iter().rev().fold(C::new(0.0, 0.0), |sum, of| sum * delta + of)
     };
-    let below = at(&ratio.below);
-    // The division of `Complex` looks for overflow, which takes as long as the rest.
-    at(&ratio.above) * below.conj() * below.norm_sqr().recip()
+    over(at(&ratio.above), at(&ratio.below))
+}
+
+/// The ratio of two values, neither so large that its square overflows.
+fn over(above: C, below: C) -> C {
+    above * below.conj() * below.norm_sqr().recip()
 }
 
 fn small(count: usize) -> f64 {

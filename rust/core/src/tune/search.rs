@@ -8,8 +8,8 @@
 use piezotrack_control::Controller;
 use rayon::prelude::*;
 
-use super::evolution::Evolution;
 use super::adaptation::Adaptation;
+use super::evolution::Evolution;
 use super::judge::{Judge, Ready};
 use super::requirements::{PlantSet, Requirements, Robustness};
 use super::run_metrics::RunMetrics;
@@ -60,7 +60,7 @@ pub struct Tuning<'a> {
     /// Candidates that each search begins with.
     pub particles: usize,
     /// Each search evolves for as many candidates as this times those it begins with, and is refined
-    /// for half as many at most.
+    /// for as many again at most.
     pub iterations: usize,
     /// Seed of the searches.
     pub seed: u64,
@@ -95,7 +95,7 @@ pub struct Found {
     pub history: Vec<f64>,
     /// Searches from different sides.
     pub searches: usize,
-    /// How many of them end within 1 % of the best.
+    /// How many of them end within 2 % of the best.
     pub agreeing: usize,
 }
 
@@ -126,26 +126,30 @@ impl Tried {
 /// Where a search begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Side {
-    /// With a low-pass slower than the loop: together with the derivative it is another structure.
+    /// With a low-pass slower than the loop, which with the derivative is another structure.
     Slow,
-    /// With a low-pass faster than the loop.
+    /// With a faster low-pass and a feedback that does most of the work.
     Fast,
-    /// At the places given, and with what one law has beyond that inside of it nearly off.
+    /// As [`Side::Fast`], at the places given, and without the observer about a law.
     Inside,
 }
 
-/// Sides of the searches; those of a later round are taken where none of the earlier agree.
-const ROUNDS: [&[Side]; 2] =
-    [&[Side::Slow, Side::Fast, Side::Inside, Side::Slow], &[Side::Fast, Side::Slow]];
+/// Sides of the searches, and their budgets as multiples of that of the first; those of the second
+/// round are taken where none of the first agree.
+const ROUNDS: [(&[Side], usize); 2] =
+    [(&[Side::Slow, Side::Fast, Side::Inside, Side::Slow], 1), (&[Side::Fast, Side::Slow], 2)];
 
 /// Searches that end within this share of the best one agree with it.
-const AGREE: f64 = 0.01;
+const AGREE: f64 = 0.02;
 
 /// Fewest candidates that a search begins with: a trial is made of four.
 const LEAST_PARTICLES: usize = 4;
 
 /// Most candidates of a search.
 const MOST_CANDIDATES: usize = 1_000_000_000;
+
+/// A refinement that after so many candidates is so much worse than the best search ends.
+const BEHIND: (usize, f64) = (800, 1.5);
 
 /// First step of a refinement, as a share of the box.
 const ABOUT: f64 = 0.1;
@@ -155,9 +159,11 @@ impl Side {
     fn part(self, setting: Setting) -> (f64, f64) {
         match (self, setting) {
             (Self::Slow, Setting::Cutoff) => (0.0, 0.3),
-            (Self::Fast, Setting::Cutoff) => (0.5, 1.0),
-            (Self::Inside, Setting::NotchDepth) => (0.9, 1.0),
-            (Self::Inside, Setting::Observer | Setting::Learning) => (0.0, 0.1),
+            (Self::Fast, Setting::Cutoff) => (0.3, 1.0),
+            (Self::Fast | Self::Inside, Setting::Integral) => (0.5, 1.0),
+            (Self::Fast | Self::Inside, Setting::Learning) => (0.0, 0.3),
+            // It does not evolve from there; its refinement has it.
+            (Self::Inside, Setting::Observer) => (0.0, 0.0),
             _ => (0.0, 1.0),
         }
     }
@@ -214,12 +220,23 @@ impl Run {
         }
     }
 
+    /// Ends where it is far behind the best of all searches.
+    fn give_up(&mut self, best: f64) {
+        let (candidates, factor) = BEHIND;
+        if let Phase::Refining(one) = &self.phase
+            && one.evaluated() >= candidates
+            && self.rank() > factor * best
+        {
+            self.phase = Phase::Ended;
+        }
+    }
+
     fn rank(&self) -> f64 {
         self.best.as_ref().map_or(f64::INFINITY, |(_, one)| one.rank())
     }
 }
 
-/// How many of some searches end within 1 % of the best.
+/// How many of some searches end within 2 % of the best.
 fn agreeing(runs: &[Run]) -> usize {
     let best = runs.iter().map(Run::rank).fold(f64::INFINITY, f64::min);
     runs.iter().filter(|run| run.rank() <= best * (1.0 + AGREE)).count()
@@ -238,11 +255,12 @@ impl Tuning<'_> {
         let mut runs: Vec<Run> = Vec::new();
         let mut counts = (0, 0);
         let mut history = Vec::new();
-        for sides in ROUNDS {
+        for (sides, times) in ROUNDS {
             if agreeing(&runs) > 1 || stop() {
                 break;
             }
-            runs.extend(sides.iter().zip(runs.len() as u64..).map(|(side, run)| self.run(*side, run)));
+            let numbered = sides.iter().zip(runs.len() as u64..);
+            runs.extend(numbered.map(|(side, run)| self.run(*side, run, times)));
             loop {
                 let asked: Vec<Vec<Vec<f64>>> = runs.iter().map(Run::asked).collect();
                 let places: Vec<&Vec<f64>> = asked.iter().flatten().collect();
@@ -258,6 +276,8 @@ impl Tuning<'_> {
                     rest = others;
                     run.tell(places, own);
                 }
+                let leads = runs.iter().map(Run::rank).fold(f64::INFINITY, f64::min);
+                runs.iter_mut().for_each(|run| run.give_up(leads));
                 let kept = runs.iter().filter_map(|run| run.best.as_ref());
                 let kept = kept.filter(|(_, best)| best.excess <= 1.0);
                 history.push(kept.map(|(_, best)| best.cost).fold(f64::INFINITY, f64::min));
@@ -300,14 +320,14 @@ impl Tuning<'_> {
     }
 
     /// A search from a side.
-    fn run(&self, side: Side, run: u64) -> Run {
+    fn run(&self, side: Side, run: u64, times: usize) -> Run {
         let address = (self.seed, run);
         let sought = self.axes.iter().flat_map(|axis| &axis.sought);
         let part: Vec<(f64, f64)> = sought.map(|one| side.part(one.setting)).collect();
         let starts: &[Vec<f64>] = if side == Side::Inside { &self.starts } else { &[] };
-        let budget = self.particles * self.iterations;
+        let budget = times * self.particles * self.iterations;
         let evolution = Evolution::new(address, &part, starts, self.particles, budget);
-        Run { address, phase: Phase::Evolving(evolution), refined: budget / 2, best: None }
+        Run { address, phase: Phase::Evolving(evolution), refined: budget, best: None }
     }
 
     fn validate(&self) -> Result<()> {
@@ -315,16 +335,16 @@ impl Tuning<'_> {
         not_negative("effort", self.effort, "m/V")?;
         self.axes.iter().flat_map(|axis| &axis.sought).try_for_each(Sought::validate)?;
         self.validate_places(&self.starts)?;
-        for (name, count, least) in [
-            ("particles", self.particles, LEAST_PARTICLES),
-            ("iterations", self.iterations, 1),
-        ] {
+        for (name, count, least) in
+            [("particles", self.particles, LEAST_PARTICLES), ("iterations", self.iterations, 1)]
+        {
             if count < least {
                 return Err(Error::parameter(name, count, format!("{least} or more")));
             }
         }
         if self.particles.saturating_mul(self.iterations) > MOST_CANDIDATES {
-            let expected = format!("such that times the iterations {MOST_CANDIDATES} at most result");
+            let expected =
+                format!("such that times the iterations {MOST_CANDIDATES} at most result");
             return Err(Error::parameter("particles", self.particles, expected));
         }
         if self.dimensions() == 0 {
