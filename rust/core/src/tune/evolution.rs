@@ -215,7 +215,7 @@ impl Evolution {
     }
 }
 
-/// Places of which each coordinate visits every one of as many equal parts once: McKay, Beckman
+/// Places of which each coordinate visits every one of as many equal parts once: `McKay`, Beckman
 /// and Conover 1979, doi 10.1080/00401706.1979.10489755.
 fn latin(seed: u64, run: u64, part: &[(f64, f64)], count: usize) -> Vec<Vec<f64>> {
     let drawn: Vec<Vec<(f64, f64)>> = (0..count as u64)

@@ -158,10 +158,11 @@ impl Side {
     /// Part of the range in which a setting begins.
     fn part(self, setting: Setting) -> (f64, f64) {
         match (self, setting) {
-            (Self::Slow, Setting::Cutoff) => (0.0, 0.3),
+            (Self::Slow, Setting::Cutoff) | (Self::Fast | Self::Inside, Setting::Learning) => {
+                (0.0, 0.3)
+            }
             (Self::Fast, Setting::Cutoff) => (0.3, 1.0),
             (Self::Fast | Self::Inside, Setting::Integral) => (0.5, 1.0),
-            (Self::Fast | Self::Inside, Setting::Learning) => (0.0, 0.3),
             // It does not evolve from there; its refinement has it.
             (Self::Inside, Setting::Observer) => (0.0, 0.0),
             _ => (0.0, 1.0),
@@ -277,7 +278,9 @@ impl Tuning<'_> {
                     run.tell(places, own);
                 }
                 let leads = runs.iter().map(Run::rank).fold(f64::INFINITY, f64::min);
-                runs.iter_mut().for_each(|run| run.give_up(leads));
+                for run in &mut runs {
+                    run.give_up(leads);
+                }
                 let kept = runs.iter().filter_map(|run| run.best.as_ref());
                 let kept = kept.filter(|(_, best)| best.excess <= 1.0);
                 history.push(kept.map(|(_, best)| best.cost).fold(f64::INFINITY, f64::min));
