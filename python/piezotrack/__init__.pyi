@@ -45,7 +45,7 @@ from .errors import ShapeError as ShapeError
 from .hardware.measuring import measure as measure
 from .identification.campaigns.campaign import campaign as campaign
 from .identification.comparison.compare import compare as compare
-from .identification.confidence.suggested_drive import suggest_drive as suggest_drive
+from .identification.confidence.suggestion.suggested_drive import suggest_drive as suggest_drive
 from .identification.experiments.step_response import identify_step as identify_step
 from .identification.fit import identify as identify
 from .identification.fitted.model_file import load as load

@@ -17,6 +17,7 @@ __all__ = [
     "DescentSettings",
     "Inverse",
     "LeastSquaresFit",
+    "LocalFit",
     "LoopPlant",
     "Objective",
     "PathTask",
@@ -195,6 +196,24 @@ class Objective:
     def costs(self, places: list[list[float]]) -> list[float]: ...
     def descend(self, places: list[list[float]]) -> list[tuple[list[float], float, int]]: ...
     def parameters(self, place: list[float]) -> list[float]: ...
+
+@final
+class LocalFit:
+    def __new__(cls, problem: Problem) -> LocalFit: ...
+    @property
+    def coordinates(self) -> list[tuple[int, str, float, float]]: ...
+    @property
+    def tied(self) -> list[str]: ...
+    def cost(self, values: Sequence[float]) -> float: ...
+    def profiles(
+        self, values: Sequence[float], wanted: Sequence[tuple[int, float]]
+    ) -> tuple[
+        tuple[list[float], float],
+        list[tuple[list[tuple[float, float]], tuple[float | None, float | None]]],
+    ]: ...
+    def refits(
+        self, values: Sequence[float], noises: Sequence[ArrayLike], draws: int, seed: int
+    ) -> list[tuple[list[float], float]]: ...
 
 @final
 class DescentSettings:

@@ -11,7 +11,7 @@ import piezotrack as pt
 from piezotrack.errors import ParameterError
 
 if TYPE_CHECKING:
-    from piezotrack.identification.fitted.covariance import Covariance
+    from piezotrack.identification.fitted.certainty.covariance import Covariance
 
 DT = 4e-3
 THRESHOLDS = (5.0, 15.0, 30.0)
@@ -39,42 +39,6 @@ def correlated(rng: np.random.Generator, count: int, pole: float, size: float) -
     for k in range(1, count + 2000):
         noise[k] = pole * noise[k - 1] + drawn[k]
     return noise[2000:]
-
-
-def coverage(u: np.ndarray, pole: float, records: int) -> tuple[float, float]:
-    """Shares of intervals of 95 % that cover, and that would if noise were independent."""
-    rng = np.random.default_rng(3)
-    clean = STAGE.simulate(u, DT, initial=STAGE.equilibrium(u[0])).x
-    hits, without = [], []
-    truth = np.array([STAGE.linear, *STAGE.weights])
-    for _ in range(records):
-        log = pt.Dataset(u=u, y=clean + correlated(rng, u.size, pole, 50e-9), dt=DT)
-        fit = pt.identify(log, "prandtl-ishlinskii", method=METHOD, drift=False, history="virgin")
-        certainty = certainty_of(fit)
-        intervals = np.array([certainty.interval(name) for name in certainty.names])
-        hits.append((intervals[:, 0] < truth) & (truth < intervals[:, 1]))
-        without.append(np.abs(certainty.values - truth) < 1.96 * certainty.independent)
-    return float(np.mean(hits)), float(np.mean(without))
-
-
-def test_intervals_cover_under_white_noise() -> None:
-    share, without = coverage(nested(), 0.0, 60)
-    assert 0.9 < share < 0.99
-    assert abs(share - without) < 0.03
-
-
-def test_intervals_cover_under_correlated_noise() -> None:
-    share, without = coverage(nested(), 0.95, 60)
-    assert share > 0.89
-    # What independence would say covers less than half of the time.
-    assert without < 0.55
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("pole", [0.0, 0.8, 0.95])
-def test_intervals_cover_over_200_records(pole: float) -> None:
-    share, _ = coverage(nested(), pole, 200)
-    assert 0.92 < share < 0.98
 
 
 @pytest.mark.slow
@@ -156,6 +120,39 @@ def test_several_records_determine_values_better() -> None:
     all_four = pt.identify(logs, "prandtl-ishlinskii", **options)
     ratio = certainty_of(all_four).deviations / certainty_of(alone).deviations
     assert np.allclose(ratio, 0.5, rtol=0.25)
+
+
+def delays_of(pole: float) -> list[pt.identification.Estimate]:
+    """Delays of two records of a stage with dry friction."""
+    stage = pt.FirstOrderDahlStage(
+        mass=1e-3,
+        damping=100.0,
+        piezo_coefficient=1.0,
+        stiffness=1e6,
+        rest_stiffness=2e5,
+        coulomb_force=5.0,
+    )
+    rng, u = np.random.default_rng(6), nested(4.0)
+    t = np.arange(u.size) * DT
+    x = stage.simulate(u, DT, initial=stage.equilibrium(u[0])).x
+    logs = [
+        pt.Dataset(u=u, y=np.interp(t - late, t, x) + correlated(rng, u.size, pole, 50e-9), dt=DT)
+        for late in (4e-3, 8e-3)
+    ]
+    known = {"stiffness": 1e6, "damping": 100.0, "mass": 1e-3}
+    fit = pt.identify(logs, "first-order-dahl", delay=True, history="virgin", parameters=known)
+    return [record.parameters["delay"] for record in fit.records]
+
+
+def test_a_delay_of_each_record_has_a_deviation_that_grows_with_correlated_noise() -> None:
+    white, coloured = delays_of(0.0), delays_of(0.9)
+    for one, other, late in zip(white, coloured, (4e-3, 8e-3), strict=True):
+        assert one.deviation is not None
+        assert other.deviation is not None
+        assert abs(other.value - late) < 4.0 * other.deviation
+        assert abs(one.value - late) < 4.0 * one.deviation
+        # A sine below the pole's frequency sees the square root of (1 + pole) / (1 - pole).
+        assert 2.5 < other.deviation / one.deviation < 6.0
 
 
 def test_wrong_levels_and_names_are_refused() -> None:

@@ -329,7 +329,7 @@ def test_the_estimates_tell_what_was_searched_and_where() -> None:
         assert estimate.value == getattr(fit.model, name)
         assert estimate.free == (name in BOX)
         assert estimate.bounds == BOX.get(name)
-        assert (estimate.deviation is None) == (name not in BOX)
+        assert (estimate.deviation is None) == (name not in BOX or estimate.at_bound)
         if estimate.bounds is not None:
             assert estimate.bounds[0] <= estimate.value <= estimate.bounds[1]
 

@@ -93,6 +93,19 @@ def test_there_and_back_bit_for_bit(tmp_path: Path, seed: int) -> None:
     assert back.scale_assumed == model.scale_assumed
 
 
+def test_the_intervals_of_a_file_are_those_of_the_fit(tmp_path: Path) -> None:
+    fit = fitted()
+    back = pt.load(fit.save(tmp_path / "dahl.json"))
+    assert fit.covariance is not None
+    assert back.covariance is not None
+    for name in fit.covariance.names:
+        assert back.covariance.interval(name) == fit.covariance.interval(name)
+    np.testing.assert_array_equal(back.covariance.matrix, fit.covariance.matrix)
+    assert back.covariance.shares == fit.covariance.shares
+    assert back.zeroed().covariance is back.covariance
+    assert back.document()["covariance"] == fit.document()["covariance"]
+
+
 def test_zeros_keep_their_sign(tmp_path: Path) -> None:
     stage = replace(pt.DahlStage.xu_li_2010(), damping=0.0, a1=0.0, a2=-0.0, b1=-0.0)
     model = published(model=stage, offset=-0.0)
@@ -223,11 +236,11 @@ def test_what_is_not_finite_is_saved_as_null(tmp_path: Path) -> None:
         bounds={},
         swarm=pt.ParticleSwarm(particles=12, iterations=30, velocity_limit=math.inf),
     )
-    assert fit.parameters["a1"].deviation == math.inf
+    assert fit.parameters["a2"].deviation == math.inf
     assert "no effect on the data" in fit.summary()
     path = fit.save(tmp_path / "dahl.json")
     content = content_of(path)
-    assert content["parameters"]["a1"]["standard_deviation"] is None
+    assert content["parameters"]["a2"]["standard_deviation"] is None
     assert content["provenance"]["swarm"]["velocity_limit"] is None
     assert pt.load(path).model == fit.model
 

@@ -122,6 +122,44 @@ BAD_ORIGIN = {
 }
 
 
+COVARIANCE: dict[str, Any] = {
+    "names": ["mass", "a1"],
+    "matrix": [[1.0], [0.5, 2.0]],
+    "values": [0.2, 1.0],
+    "determined": [True, True],
+    "independent": [1.0, 1.0],
+    "factors": [1.0, 1.0],
+    "widening": [1.0, 1.0],
+    "shifts": [[0.0, 1.0], [0.0, 1.0]],
+    "to_least_cost": [0.0, 0.0],
+    "samples": 100,
+    "orders": [2],
+    "predicted": {"value": 1e-7, "unit": "m"},
+}
+
+
+@pytest.mark.parametrize(
+    ("entry", "to", "message"),
+    [
+        ("matrix", [[1.0], [0.5]], "covariance: matrix has 2 rows: expected the lower triangle"),
+        ("matrix", [[1.0], [None, 2.0]], "covariance: matrix has null: expected finite numbers"),
+        ("values", [0.2], "covariance: values has 1 entries: expected 2"),
+        ("samples", -1, "covariance: samples is -1"),
+        ("names", None, "an entry is not of the form that 'save' writes"),
+    ],
+)
+def test_refuses_a_covariance_of_another_form(
+    tmp_path: Path, entry: str, to: object, message: str
+) -> None:
+    path = tmp_path / "dahl.json"
+    path.write_bytes(changed("covariance", to=COVARIANCE))
+    assert pt.load(path).covariance is not None
+    path.write_bytes(changed("covariance", to={**COVARIANCE, entry: to}))
+    with pytest.raises(pt.DataError, match=r"^dahl\.json: ") as caught:
+        pt.load(path)
+    assert message in str(caught.value)
+
+
 @pytest.mark.parametrize("name", BAD_ORIGIN)
 def test_refuses_a_bad_origin(tmp_path: Path, name: str) -> None:
     content, message = BAD_ORIGIN[name]

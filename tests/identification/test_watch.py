@@ -68,6 +68,20 @@ def test_a_file_gives_the_same_bits(tmp_path: Path) -> None:
     assert pt.watch(stored, record).document() == pt.watch(model_watched(), record).document()
 
 
+def test_a_model_that_is_known_less_well_has_wider_intervals(tmp_path: Path) -> None:
+    model = pt.load(model_watched().save(tmp_path / "model.json"))
+    assert model.covariance is not None
+    record, widths = watched(31), []
+    for times in (0.0, 1e2, 1e4):
+        known = replace(model.covariance, matrix=times * model.covariance.matrix)
+        change = pt.watch(replace(model, covariance=known), record)["gain"]
+        assert change.interval is not None
+        widths.append(change.interval[1] - change.interval[0])
+    assert widths[0] < widths[1] < widths[2]
+    # Where the model decides the width, it goes with the deviations.
+    assert widths[2] - widths[0] > 5.0 * (widths[1] - widths[0])
+
+
 def test_a_slow_record_does_not_judge_the_mode() -> None:
     t = DT * np.arange(4000)
     u = 35.0 - 35.0 * np.cos(2.0 * np.pi * 0.3 * t)

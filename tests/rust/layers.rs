@@ -23,7 +23,7 @@ const CORE: [&str; 10] = [
 ];
 
 /// The rooms of `identify`, from the bottom up.
-const IDENTIFY: [&str; 11] = [
+const IDENTIFY: [&str; 12] = [
     "swarm",
     "records",
     "parameters",
@@ -34,6 +34,7 @@ const IDENTIFY: [&str; 11] = [
     "search",
     "experiments",
     "inference",
+    "intervals",
     "identification",
 ];
 

@@ -21,6 +21,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     identify::identification::register(module)?;
     identify::covariance::register(module)?;
     identify::descents::register(module)?;
+    identify::local_fit::register(module)?;
     identify::objective::register(module)?;
     identify::step::register(module)?;
     identify::swarm::register(module)?;

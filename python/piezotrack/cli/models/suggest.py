@@ -45,7 +45,7 @@ def suggest_command(
         save_figures,
         write_document,
     )
-    from ...identification.confidence.suggested_drive import suggest_drive
+    from ...identification.confidence.suggestion.suggested_drive import suggest_drive
     from ...identification.fitted.model_file import load
 
     if noise_nm is not None and not 0.0 < noise_nm < math.inf:

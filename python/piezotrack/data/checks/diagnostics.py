@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +22,15 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["check_record", "fit_warnings", "jumps", "record_warnings", "runs", "turns"]
+__all__ = [
+    "amplitudes",
+    "check_record",
+    "fit_warnings",
+    "jumps",
+    "record_warnings",
+    "runs",
+    "turns",
+]
 
 # A signal reverses where it goes back by this share of its range.
 TURN = 0.05
@@ -188,6 +197,25 @@ def _lopsided(data: Dataset) -> bool:
 def turns(signal: Array) -> list[int]:
     """Return the samples at which a signal reverses by 5 % of its range or more."""
     return _core.turns(signal, TURN * float(np.ptp(signal)))
+
+
+def amplitudes(u: Array) -> Array:
+    """Return half of the travel of a drive between the turning points around each sample.
+
+    Parameters
+    ----------
+    u : ndarray, shape (n,)
+        The drive [V].
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        The amplitudes [V].
+    """
+    amplitude = np.zeros(u.size)
+    for first, last in pairwise([0, *turns(u), u.size - 1]):
+        amplitude[first : last + 1] = np.ptp(u[first : last + 1]) / 2.0
+    return amplitude
 
 
 def _steps(u: Array) -> bool:

@@ -11,13 +11,14 @@ import numpy as np
 
 from ... import _core
 from ...errors import DataError, PiezotrackError
-from ..fitted.covariance import Covariance, NoiseShares
+from ..fitted.certainty.covariance import Covariance, NoiseShares
 from ..solve.search import details_of
-from ..solve.selection import period_of
+from ..solve.selection import SAME_PERIOD, period_of
+from .held_out import held_out
 from .sensitivity import DELAY, Value, fitted_values, gradient, sensitivity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["covariance_of", "with_covariance"]
+__all__ = ["covariance_of", "with_covariance", "without_repeated"]
 
 # Most samples of a record; of more, means of neighbours.
 MOST, MOST_RESAMPLED = 2**16, 2**12
@@ -58,28 +59,87 @@ def with_covariance(fit: Identification) -> Identification:
         covariance = covariance_of(fit, records)
     except PiezotrackError:
         covariance = None
+    known = [{} for _ in fit.records] if covariance is None else _of_each_record(fit, covariance)
     parameters = {
-        name: estimate._replace(deviation=_deviation(fit, covariance, name, estimate))
+        name: estimate._replace(deviation=_deviation(fit, covariance, name, estimate, known[0]))
         for name, estimate in fit.parameters.items()
     }
+    several = tuple(
+        replace(one, parameters=_of_record(one.parameters, own))
+        for one, own in zip(fit.records, known, strict=True)
+    )
     entries = dict(fit.details.get("parameters", {}))
     entries |= {name: details_of(parameters[name]) for name in set(entries) & set(parameters)}
     details: dict[str, Any] = {**fit.details, "parameters": entries}
     if DELAY in parameters:
         details[DELAY] = details_of(parameters[DELAY])
-    return replace(fit, covariance=covariance, parameters=parameters, details=details)
+    return replace(
+        fit, covariance=covariance, parameters=parameters, records=several, details=details
+    )
+
+
+def _of_record(
+    estimates: Mapping[str, Estimate], known: Mapping[str, float]
+) -> dict[str, Estimate]:
+    return {n: one._replace(deviation=known.get(n, one.deviation)) for n, one in estimates.items()}
 
 
 def _deviation(
-    fit: Identification, covariance: Covariance | None, name: str, estimate: Estimate
+    fit: Identification,
+    covariance: Covariance | None,
+    name: str,
+    estimate: Estimate,
+    known: Mapping[str, float],
 ) -> float | None:
     """Return the standard deviation of a parameter of a search."""
     if covariance is not None and name in covariance.names:
         return covariance.deviation(name)
     if estimate.tie is not None and covariance is not None:
         return covariance.reach(gradient(fit, Value(name).of), level=0.6826894921370859)
-    # On a bound, and of what belongs to a record, for independent residuals.
-    return estimate.deviation
+    return known.get(name, estimate.deviation)
+
+
+def _of_each_record(fit: Identification, covariance: Covariance) -> list[dict[str, float]]:
+    """Return the standard deviations of what was fitted to each record alone."""
+    free = [
+        {name for name, one in record.parameters.items() if one.free and not one.at_bound}
+        for record in fit.records
+    ]
+    known: list[dict[str, float]] = [{} for _ in free]
+    if len(free) == 1 and DELAY in free[0] and DELAY in covariance.names:
+        known[0][DELAY] = covariance.deviation(DELAY)
+        free[0].remove(DELAY)
+    if not any(free):
+        return known
+    values = fitted_values(fit)
+    sizes = _sizes(fit, values)
+    records = [(one.data, one.weight) for one in fit.records if one.data is not None]
+    linear = [sensitivity(fit, data, values) for data, _ in records]
+    rows = [(r, name) for r, one in enumerate(linear) for name in one.alone if name in free[r]]
+    extended = [
+        _Linear(_with_rows(one, r, rows), data, weight, np.append(sizes, np.ones(len(rows))))
+        for r, (one, (data, weight)) in enumerate(zip(linear, records, strict=True))
+    ]
+    precision = np.diag(np.append(_precision(fit, values) * sizes**2, np.zeros(len(rows))))
+    matrix, determined, *_ = _core.linearised_covariance(
+        [record.thinned(MOST) for record in extended], precision.tolist(), 0, SEED
+    )
+    for k, (r, name) in enumerate(rows, start=len(values)):
+        known[r][name] = math.sqrt(matrix[k][k]) if determined[k] else math.inf
+    return known
+
+
+def _with_rows(linear: Sensitivity, record: int, rows: list[tuple[int, str]]) -> Sensitivity:
+    """Take what belongs to records alone for values, 0 in the other records."""
+    mine = dict(zip(linear.alone, linear.nuisance, strict=True))
+    none = np.zeros(linear.residual.size)
+    added = [mine.pop(name) if r == record else none for r, name in rows]
+    return replace(
+        linear,
+        columns=np.concatenate([linear.columns, added]),
+        nuisance=np.array(list(mine.values())).reshape(-1, none.size),
+        alone=tuple(mine),
+    )
 
 
 def covariance_of(
@@ -112,10 +172,11 @@ def covariance_of(
     values = fitted_values(model)
     if not values:
         raise DataError("no value was fitted: expected one or more")
-    sizes = np.array([abs(value.of(model)) or records[0][0].dt for value in values])
+    sizes = _sizes(model, values)
+    at = [sensitivity(model, data, values) for data, _ in records]
     linear = [
-        _Linear(sensitivity(model, data, values), data, weight, sizes, noise)
-        for data, weight in records
+        _Linear(one, data, weight, sizes, noise)
+        for one, (data, weight) in zip(at, records, strict=True)
     ]
     # Least squares end within 0.3 % of the least cost.
     aside = getattr(model, "lags", None) is not None and model.model.info.searched
@@ -129,19 +190,30 @@ def covariance_of(
         few = [record.thinned(MOST_RESAMPLED) for record in linear]
         *_, resampled, _ = _core.linearised_covariance(few, precision, DRAWS, SEED)
     quantiles = np.quantile(np.array(resampled), LEVEL, axis=0)
+    # Independent residuals have the variance of all that is left, not of the noise alone.
+    powers = [sum(one.power_of(part) for one in linear) for part in ("noise", "residual")]
+    with np.errstate(all="ignore"):
+        factors = np.diag(np.array(rows)) / np.array(independent) * powers[0] / powers[1]
     return Covariance(
         names=tuple(str(value) for value in values),
         values=np.array([value.of(model) for value in values]),
         matrix=np.array(rows) * np.outer(sizes, sizes),
         determined=np.array(determined),
         independent=np.sqrt(np.array(independent)) * sizes,
+        factors=np.where(np.isfinite(factors), factors, 1.0),
         widening=np.maximum(quantiles / NormalDist().inv_cdf(0.5 + 0.5 * LEVEL), 1.0),
         shifts=np.array(shifts) * sizes[:, None],
         to_least_cost=sizes * (np.array(steps) if aside else 0.0),
         samples=sum(record.samples for record in linear),
         orders=tuple(orders),
+        predicted=held_out(model, records, at).quantile(LEVEL),
         shares=linear[0].shares,
     )
+
+
+def _sizes(model: IdentifiedModel, values: list[Value]) -> Array:
+    """Sizes of the values, SI; 1 of one that is 0."""
+    return np.array([abs(value.of(model)) or 1.0 for value in values], dtype=np.float64)
 
 
 def _precision(model: IdentifiedModel, values: list[Value]) -> Array:
@@ -162,17 +234,22 @@ class _Linear:
         data: Dataset,
         weight: float,
         sizes: Array,
-        noise: Literal["not repeated", "residual"],
+        noise: Literal["not repeated", "residual"] = "not repeated",
     ) -> None:
         self.columns, self.nuisance = linear.columns * sizes[:, None], linear.nuisance
         self.residual, self.weight = linear.residual, weight
-        self.noise, self.shares = _without_repeated(linear.residual, data)
+        self.noise, self.shares = without_repeated(linear.residual, data)
         if noise == "residual":
             self.noise = linear.residual
 
     @property
     def samples(self) -> int:
         return self.residual.size
+
+    def power_of(self, part: Literal["noise", "residual"]) -> float:
+        """Weighted sum of squares of a part."""
+        values = self.noise if part == "noise" else self.residual
+        return self.weight * float(values @ values)
 
     def thinned(self, most: int) -> tuple[list[Array], list[Array], Array, Array, float]:
         """Means of neighbours, so many samples at most."""
@@ -193,9 +270,39 @@ class _Linear:
         )
 
 
-def _without_repeated(residual: Array, data: Dataset) -> tuple[Array, NoiseShares | None]:
-    """Noise of a residual: what does not repeat with the drive; and both shares."""
+def _period(data: Dataset) -> int | None:
+    """Period of a drive that repeats, be it of several amplitudes."""
     period = period_of(data)
+    if period is not None:
+        return period
+    u = data.u
+    turns = _core.turns(u, 0.5 * float(np.ptp(u)))
+    near = SAME_PERIOD * float(np.std(u))
+    for turn in turns[2::2]:
+        for after in (turn - turns[0] - 1, turn - turns[0], turn - turns[0] + 1):
+            if after * PERIODS <= u.size and float(np.std(u[after:] - u[:-after])) <= near:
+                return int(after)
+    return None
+
+
+def without_repeated(residual: Array, data: Dataset) -> tuple[Array, NoiseShares | None]:
+    """Return the noise of a residual: what does not repeat with the drive; and both shares.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+        Measured less simulated displacement, of the readings that count [m].
+    data : Dataset
+        The record.
+
+    Returns
+    -------
+    noise : ndarray, shape (n,)
+        The noise [m]; all of the residual where there are fewer than three whole periods.
+    shares : NoiseShares or None
+        Model error and noise, where there are three or more.
+    """
+    period = _period(data)
     if period is None or residual.size != data.u.size:
         return residual, None
     count = residual.size // period

@@ -16,7 +16,7 @@ from .sensitivity import fitted_values, moved
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..fitted.covariance import Covariance
+    from ..fitted.certainty.covariance import Covariance
     from .sensitivity import Value
 
     Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from ..fitted.identified_model import IdentifiedModel
 from ..fitted.start import same_beginning, start_after, start_at_jump
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -27,6 +27,7 @@ __all__ = [
     "DELAY",
     "Sensitivity",
     "Value",
+    "changes",
     "fitted_values",
     "free_values",
     "gradient",
@@ -75,14 +76,17 @@ class Sensitivity:
     columns : ndarray, shape (p, n)
         Change of the displacement with each value, in the unit of the value [m/...].
     nuisance : ndarray, shape (q, n)
-        The same of what belongs to the record alone: offset, drift, voltage before the record,
-        and of one of several records its delay.
+        The same of what belongs to the record alone, a row each of `alone`.
+    alone : tuple of str
+        What belongs to the record alone: ``"offset"``, ``"drift"``, ``"drift_time"``,
+        ``"voltage_before"``, and of one of several records its ``"delay"``.
     residual : ndarray, shape (n,)
         Measured less simulated displacement [m].
     """
 
     columns: Array
     nuisance: Array
+    alone: tuple[str, ...]
     residual: Array
 
 
@@ -195,7 +199,8 @@ def moved(model: IdentifiedModel, values: list[Value], changes: Array) -> Identi
             numbers[value.entry] += change
             changed[value.parameter] = tuple(numbers)
     try:
-        stage = replace(model.model, **{**changed, **_tied(model, changed)})
+        changed |= _tied(model, changed) | _normalised(model, changed)
+        stage = replace(model.model, **changed)
     except PiezotrackError:
         return None
     return replace(_without_search(model), model=stage, delay=delay)
@@ -212,6 +217,38 @@ def _tied(model: IdentifiedModel, changed: Mapping[str, Any]) -> dict[str, float
     known = [0.0 if value is None else float(value) for value in values]
     tied = _core.tied_values(model.model.info.name, known, ties)
     return {scalars[place]: tied[place] for place, _ in ties}
+
+
+def _normalised(model: IdentifiedModel, changed: Mapping[str, Any]) -> dict[str, Any]:
+    """Values that follow from others in a fit by least squares."""
+    stage = model.model
+    if stage.info.searched or not changed:
+        return {}
+    now = {name: changed.get(name, getattr(stage, name)) for name in stage.parameter_names()}
+    if "slip_displacements" in now:
+        # The thresholds stay where they are.
+        known = (stage.piezo_coefficient, stage.stiffness_ratios)
+        drive = _slips(*known, stage.slip_displacements, inverse=True)
+        slips = _slips(now["piezo_coefficient"], now["stiffness_ratios"], drive)
+        return {"slip_displacements": slips}
+    if now.get("scale") is None or stage.falling_scale is not None or model.drive_range is None:
+        return {}
+    # The envelope is 0 at 0 V and rises by as much as the drive.
+    ends = np.array(model.drive_range)
+    rise = float(np.diff(np.tanh(stage.slope * ends + stage.shift))[0]) * stage.scale
+    scale = rise / float(np.diff(np.tanh(now["slope"] * ends + now["shift"]))[0])
+    middle = stage.level + stage.scale * np.tanh(stage.shift)
+    return {"scale": scale, "level": float(middle - scale * np.tanh(now["shift"]))}
+
+
+def _slips(
+    gain: float, ratios: Sequence[float], at: Sequence[float], *, inverse: bool = False
+) -> tuple[float, ...]:
+    """Displacements at which elements slip [m], of thresholds of the drive [V]; or the inverse."""
+    stiffness = 1.0 + np.append(np.cumsum(ratios[::-1])[::-1], 0.0)[: len(at)]
+    slopes = abs(gain) / stiffness
+    steps = np.diff(np.array(at), prepend=0.0)
+    return tuple(np.cumsum(steps / slopes if inverse else steps * slopes).tolist())
 
 
 def _without_search(model: IdentifiedModel) -> IdentifiedModel:
@@ -239,18 +276,51 @@ def sensitivity(model: IdentifiedModel, data: Dataset, values: list[Value]) -> S
         Of the readings that count.
     """
     record = _Linearised(model, data)
-    sizes = [_step(value, model, data) for value in values]
-    columns = [record.column(value, size) for value, size in zip(values, sizes, strict=True)]
-    shape = (len(values), record.residual.size)
+    count, nuisance = record.residual.size, record.nuisance()
     return Sensitivity(
-        columns=np.array(columns).reshape(shape),
-        nuisance=np.array(record.nuisance()).reshape(-1, shape[1]),
+        columns=changes(model, values, record.begun, data.dt).reshape(-1, count),
+        nuisance=np.array(list(nuisance.values())).reshape(-1, count),
+        alone=tuple(nuisance),
         residual=record.residual,
     )
 
 
-def _step(value: Value, model: IdentifiedModel, data: Dataset) -> float:
-    return LATER * data.dt if value.parameter == DELAY else STEP * abs(value.of(model))
+def changes(
+    model: IdentifiedModel,
+    values: list[Value],
+    motion: Callable[[IdentifiedModel], Array],
+    dt: float,
+) -> Array:
+    """Differentiate a motion by values of an identified model, by central differences.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+    values : list of Value
+        What is moved.
+    motion : callable
+        The motion of a model beside it [m], shape (n,).
+    dt : float
+        Sampling interval [s].
+
+    Returns
+    -------
+    ndarray, shape (p, n)
+        Change with each value, in the unit of the value [m/...]; 0 where there is no such stage
+        beside it.
+    """
+    columns = []
+    for value in values:
+        size = LATER * dt if value.parameter == DELAY else STEP * abs(value.of(model))
+        for ways in ((1.0, -1.0), (1.0, 0.0), (0.0, -1.0)):
+            up, down = (moved(model, [value], np.array([size * way])) for way in ways)
+            if up is not None and down is not None:
+                columns.append((motion(up) - motion(down)) / (size * (ways[0] - ways[1])))
+                break
+        else:
+            columns.append(np.zeros_like(motion(model)))
+    return np.array(columns)
 
 
 class _Linearised:
@@ -269,37 +339,39 @@ class _Linearised:
 
     def _level(self, reading: Array) -> Array:
         """Offset and drift that suit a residual best."""
-        columns = self._sensor()
+        columns = list(self._sensor().values())
         if not columns:
             return np.zeros(reading.size)
         basis = np.array(columns).T
         return np.asarray(basis @ np.linalg.lstsq(basis, reading, rcond=1e-12)[0])
 
-    def _sensor(self) -> list[Array]:
+    def _sensor(self) -> dict[str, Array]:
         """Columns of the offset and of the drift's size."""
         t = self.data.counted(self.data.t)
         drift = self.record.drift
-        columns = [np.ones(t.size)] if self.record.offset_fitted or drift else []
+        columns = {"offset": np.ones(t.size)} if self.record.offset_fitted or drift else {}
         if drift:
-            columns.append(np.exp(-(t - drift.begin) / drift.time))
+            columns["drift"] = np.exp(-(t - drift.begin) / drift.time)
         return columns
 
-    def nuisance(self) -> list[Array]:
+    def nuisance(self) -> dict[str, Array]:
         """Columns of what belongs to the record alone."""
         columns = self._sensor()
         drift = self.record.drift
         if drift and drift.time_fitted:
             t = self.data.counted(self.data.t)
             ends = [np.exp(-(t - drift.begin) / (s * drift.time)) for s in (1 + STEP, 1 - STEP)]
-            columns.append((ends[0] - ends[1]) / (2.0 * STEP))
+            columns["drift_time"] = (
+                drift.amplitude * (ends[0] - ends[1]) / (2.0 * STEP * drift.time)
+            )
         if self.start.history == "fit" and self.start.voltage is not None:
             reach = BEFORE * float(np.ptp(self.data.full.u))
             states = [self._begun(self.model, self.start.voltage + s) for s in (reach, -reach)]
             up, down = (self._counted(self.model, state) for state in states)
-            columns.append((up - down) / (2.0 * reach))
+            columns["voltage_before"] = (up - down) / (2.0 * reach)
         several = len(self.model.records) > 1
         if several and "delay" in self.record.parameters:
-            columns.append(self._delayed())
+            columns["delay"] = self._delayed()
         return columns
 
     def _delayed(self) -> Array:
@@ -316,14 +388,9 @@ class _Linearised:
         up, down = (self._counted(replace(base, records=all_), self.start.state) for all_ in at)
         return np.asarray((up - down) / (2.0 * step))
 
-    def column(self, value: Value, size: float) -> Array:
-        """Change of the displacement with a value [m/...]."""
-        for ways in ((1.0, -1.0), (1.0, 0.0), (0.0, -1.0)):
-            models = [moved(self.model, [value], np.array([size * way])) for way in ways]
-            if None not in models:
-                up, down = (self._counted(one, self._begun(one)) for one in models if one)
-                return np.asarray((up - down) / (size * (ways[0] - ways[1])))
-        return np.zeros(self.residual.size)
+    def begun(self, model: IdentifiedModel) -> Array:
+        """Return the reading of a model that begins as the record does [m]."""
+        return self._counted(model, self._begun(model))
 
     def _counted(self, model: IdentifiedModel, state: StageState) -> Array:
         return np.asarray(self.data.counted(self._reading(model, state)))

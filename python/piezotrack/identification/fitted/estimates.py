@@ -61,10 +61,10 @@ class Estimate(NamedTuple):
     bounds : (float, float) or None
         Of the search.
     deviation : float or None
-        Standard deviation for residuals that are correlated, as of `Covariance`; of a value on a
-        bound, and of a voltage or drift time of the record, for independent ones. Infinite where
-        the parameter has no effect on the data, such as a mass that a record does not show and
-        that was held for that.
+        Standard deviation for residuals that are correlated, as of `Covariance`; None of a value
+        on a bound, on one side of which there are no others. Infinite where the parameter has no
+        effect on the data, such as a mass that a record does not show and that was held for
+        that.
     at_bound : bool
         Whether the value lies on a bound, or on a constraint.
     scale : {"linear", "log"} or None

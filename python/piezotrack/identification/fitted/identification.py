@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from ...data.dataset import Dataset
     from ...stages.motion import Response
     from ..methods.least_squares import LeastSquares
-    from .covariance import Covariance
     from .estimates import Constraint, Estimate, LagRange, SearchRun, StopReason
     from .score import Score
     from .selection import Selection
@@ -78,8 +77,6 @@ class Identification(IdentifiedModel):
         Lags that fit as well, where the drive is too slow to tell them from hysteresis and creep.
     selection : Selection or None
         The choice between models; None without ``model="auto"``.
-    covariance : Covariance or None
-        How sure the values are; None where the record is too short for it.
     at_bound : bool
         Whether least squares left a time constant or a frequency on a bound of its range.
     """
@@ -103,7 +100,6 @@ class Identification(IdentifiedModel):
     search: SearchRun | None = None
     lags: LagRange | None = None
     selection: Selection | None = None
-    covariance: Covariance | None = None
     at_bound: bool = False
 
     def __post_init__(self) -> None:

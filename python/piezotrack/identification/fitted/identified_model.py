@@ -20,6 +20,7 @@ from ...data.resampling import interpolated
 from ...errors import ParameterError, ShapeError
 from ...stages.delayed_reading import delayed_reading
 from ...stages.slow_loop import SlowLoop
+from .certainty.covariance import covariance_entry
 from .drift import drift_entry
 from .fitted_record import record_entries, record_of
 from .model_entries import (
@@ -45,6 +46,9 @@ if TYPE_CHECKING:
     from ...data.dataset import Hold
     from ...stages.inverse import Inverse
     from ...stages.motion import Response, StageState
+    from .certainty.confidence import Confidence
+    from .certainty.covariance import Covariance
+    from .certainty.prediction_band import PredictionBand
     from .drift import Drift
     from .fitted_record import FittedRecord
     from .start import History, Start
@@ -89,6 +93,9 @@ class IdentifiedModel(Result):
     interpolation : int or None
         Samples to which each of a record whose drive is fast for its sampling rate is interpolated,
         as in the fit: band-limited. None where the drive goes straight from sample to sample.
+    covariance : Covariance or None
+        How sure the values are; None where the record is too short for it, and in files of older
+        versions.
     details : mapping
         Other entries of the model file: fit, provenance.
     """
@@ -98,6 +105,8 @@ class IdentifiedModel(Result):
         "plot": "identification.views.plot:plot_model",
         "loop": "identification.views.plot:plot_model_loop",
         "time": "identification.views.plot:plot_model_time",
+        "confidence": "identification.confidence.intervals.intervals_of:intervals_of",
+        "band": "identification.confidence.prediction_band:prediction_band",
     }
 
     # A stage of any model: each has its own parameters.
@@ -111,6 +120,7 @@ class IdentifiedModel(Result):
     drift: Drift | None = None
     records: tuple[FittedRecord, ...] = ()
     interpolation: int | None = None
+    covariance: Covariance | None = field(default=None, repr=False, compare=False)
     details: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
@@ -536,6 +546,48 @@ class IdentifiedModel(Result):
             return shift
         return float(np.mean(data.counted(data.y - x))) if self._fits_offset(data) else 0.0
 
+    def confidence(
+        self, level: float = 0.95, *, method: Literal["profile", "bootstrap"] = "profile"
+    ) -> Confidence:
+        """Return intervals of confidence that hold where the cost is not quadratic too.
+
+        `Identification.covariance`, which every fit has, is exact for small deviations. A profile
+        shows whether the records limit a parameter at all, and on which side. Refits check both:
+        they take the model and the resampled noise for true.
+
+        Parameters
+        ----------
+        level : float, optional
+            Between 0 and 1.
+        method : {"profile", "bootstrap"}, optional
+            Profiles of the cost, or 200 refits of resampled noise, the same in every call.
+
+        Returns
+        -------
+        Confidence
+            The intervals, with a lower minimum where a profile met one.
+
+        Raises
+        ------
+        ParameterError
+            `level` or `method` is none of these, the model was read from a file and has no record,
+            or its parameters were not searched.
+        DataError
+            The record is too short.
+        NumericalError
+            The fit leaves no residual.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:8.0]
+        >>> fit = pt.identify(log, "first-order-dahl", method=pt.Descents(seed=1))
+        >>> fit.confidence(0.68).parameters["piezo_coefficient"].shape
+        'bounded'
+        """
+        intervals: Confidence = self.view("confidence")(self, level, method)
+        return intervals
+
     def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
         """Loop, displacement with its error over time, and convergence of a search.
 
@@ -630,6 +682,55 @@ class IdentifiedModel(Result):
         drawn: tuple[Axes, Axes] = self.view("time")(self, data, axes)
         return drawn
 
+    def prediction_band(
+        self,
+        u: ArrayLike | Dataset,
+        dt: float | None = None,
+        *,
+        level: float = 0.95,
+        records: Sequence[Dataset] | None = None,
+    ) -> PredictionBand:
+        """Predict the displacement under a drive, with a band in which a reading is expected.
+
+        Noise of the sensor, parameters and error of the model are kept apart; see `PredictionBand`.
+
+        Parameters
+        ----------
+        u : array_like, shape (n,), or Dataset
+            The drive [V], from rest, as that of an inverse; or a record, whose offset, drift and
+            beginning follow from its readings.
+        dt : float, optional
+            Sampling interval [s], of a drive that is no record.
+        level : float, optional
+            Probability with which a reading is in the band.
+        records : sequence of Dataset, optional
+            Records on which the errors are found, at best some that were not fitted; those of the
+            fit where not given. A model from a file has none.
+
+        Returns
+        -------
+        PredictionBand
+            The displacement and its band.
+
+        Raises
+        ------
+        ParameterError
+            `level` is not between 0 and 1, there is no record, or its drive has another unit.
+        ShapeError, DataError
+            `u` is no drive, or has fewer than 8 samples.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:13.0]
+        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+        >>> band = fit.prediction_band(log.u - log.u[0], log.dt)
+        >>> bool(band.noise.max() < band.half.max() < 0.5e-6)
+        True
+        """
+        predicted: PredictionBand = self.view("band")(self, u, dt, level=level, records=records)
+        return predicted
+
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.
 
@@ -658,6 +759,7 @@ class IdentifiedModel(Result):
             **drift_entry(self.drift),
             **({"interpolation": self.interpolation} if self.interpolation else {}),
             **record_entries(self.records, self.drive_unit),
+            **covariance_entry(self.covariance),
             **details,
         }
 

@@ -11,6 +11,7 @@ from ..._support.files.json_text import number_pair, object_of, parse_json, text
 from ..._support.units import of_drive
 from ...errors import DataError, ParameterError, PiezotrackError
 from ...stages.registry import model_named, stage_class
+from .certainty.covariance import covariance_of_file
 from .drift import drift_of
 from .fitted_record import records_of_file
 from .identified_model import IdentifiedModel
@@ -53,6 +54,7 @@ OWN = {
     "drift",
     "records",
     "interpolation",
+    "covariance",
 }
 # Most samples to which one is interpolated.
 MOST_FINER = 100
@@ -113,6 +115,7 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
             drift=drift_of(document.get("drift")),
             records=_records(document, stage_class(info)._state),
             interpolation=_interpolation(document.get("interpolation")),
+            covariance=covariance_of_file(document.get("covariance")),
             details={
                 "parameters": {key: _fit_details(entry) for key, entry in parameters.items()},
                 "delay": _fit_details(delay),

@@ -222,8 +222,9 @@ def _identification(
 
 
 def _estimate(entry: Mapping[str, Any], unit: str, symbol: str) -> Estimate:
-    """Return what a search found of a parameter."""
-    bounds, deviation, at_bound = entry["bounds"], entry["deviation"], entry["at_bound"]
+    """Return what a search found of a parameter; standard deviations come with the covariance."""
+    bounds, at_bound = entry["bounds"], entry["at_bound"]
+    deviation = math.inf if entry["not_shown"] else None
     known = {name: entry[name] for name in ("scale", "tie", "prior")}
     value = entry["value"]
     free = bounds is not None

@@ -41,6 +41,7 @@ CHOSEN = (
     "low",
     "high",
     "dead_zone_thresholds",
+    "slip_displacements",
     "creep_times",
 )
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..._support.display.table import words
 from .confidence.residual_report import fit_notes
-from .quantities import errors_of, of_sensor, of_stage
+from .quantities import errors_of, of_sensor, of_stage, predicted
 from .report import parameter_notes
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def identification_html(fit: Identification) -> str:
         rows += [*of_sensor(fit.records[0], fit.data), *errors_of(fit, 0)]
     else:
         rows.append(("rms error", f"{fit.cost_um:.4g} um, {fit.cost_percent:.3g} % of stroke"))
+    rows += predicted(fit)
     rows += [("constraint", _constraint(one)) for one in fit.constraints]
     rows += [("note", note) for note in fit_notes(fit)]
     tables = [words(f"Identification: {fit.model.info.title}", rows).html()]
@@ -78,7 +79,7 @@ def _estimate(fit: Identification, name: str, estimate: Estimate) -> tuple[str, 
     if not estimate.free and estimate.tie is None:
         deviation = "held"
     elif estimate.deviation is None:
-        deviation = "unknown"
+        deviation = "" if estimate.at_bound else "unknown"
     else:
         deviation = (
             f"{estimate.deviation:.2g}" if math.isfinite(estimate.deviation) else "no effect"
@@ -88,7 +89,7 @@ def _estimate(fit: Identification, name: str, estimate: Estimate) -> tuple[str, 
         estimate.symbol,
         f"{estimate.value:.6g}",
         estimate.unit,
-        deviation + parameter_notes(fit, name),
+        (deviation + parameter_notes(fit, name)).removeprefix(", "),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..._support.arguments import expect, finite, positive
 from ..._support.display.plot_style import (
+    BAND,
     ERROR,
     GUIDE,
     MARKS,
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = [
+    "band_of",
     "named",
     "plot_convergence",
     "plot_loop",
@@ -111,6 +113,7 @@ def plot_time(
     *,
     stroke: float | None = None,
     fitted_until: float | None = None,
+    half: Array | None = None,
     title: str = "Displacement over time",
 ) -> tuple[Axes, Axes]:
     """Draw measured and simulated displacement over time, and the error below.
@@ -127,6 +130,8 @@ def plot_time(
         Stroke that the percentage refers to [m]; the record's own where not given.
     fitted_until : float, optional
         Time [s] up to which the record was fitted; a line marks it.
+    half : ndarray, shape (n,), optional
+        Half width of the band in which 95 % of the errors are expected [m].
     title : str, optional
         What ran.
 
@@ -158,6 +163,11 @@ def plot_time(
     t, error = data.at_readings(data.t), data.at_readings(error)
     kept = thinned(error)
     below.plot(t[kept], fine * error[kept], **{**ERROR, "linewidth": 0.8})
+    if half is not None:
+        kept = thinned(half)
+        width = fine * half[kept]
+        below.fill_between(data.t[kept], -width, width, **BAND)
+        legend_inside(below)
     below.axhline(0.0, **GUIDE)
     below.set(xlabel="time [s]", ylabel=f"error [{small}]")
     rms = float(np.sqrt(np.mean(error**2)))
@@ -312,7 +322,7 @@ def plot_model(
         plot_convergence(fit, figure.add_subplot(grid[1, 0]))
     above = figure.add_subplot(grid[0, 1])
     below = figure.add_subplot(grid[1, 1], sharex=above)
-    plot_time(record, run, (above, below), stroke=model.stroke)
+    plot_time(record, run, (above, below), stroke=model.stroke, half=band_of(model, record))
     title = what_was_shown(model, record, run)
     figure.suptitle(what_was_fitted(fit) if fit and data is None else title, fontsize="large")
     return whole(figure)
@@ -329,7 +339,29 @@ def plot_model_time(
     model: IdentifiedModel, data: Dataset | None = None, axes: Sequence[Axes] | None = None
 ) -> tuple[Axes, Axes]:
     """Draw displacement and error of a model on a record, as `plot_time`."""
-    return plot_time(*_shown(model, data), axes, stroke=model.stroke)
+    record, run = _shown(model, data)
+    return plot_time(record, run, axes, stroke=model.stroke, half=band_of(model, record))
+
+
+def band_of(model: IdentifiedModel, data: Dataset) -> Array | None:
+    """Return the half width of the band of a prediction; None of a model without its records.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+    data : Dataset
+        The record that is predicted.
+
+    Returns
+    -------
+    ndarray, shape (n,), or None
+        The half width [m].
+    """
+    if not isinstance(model, Identification) or model.covariance is None:
+        return None
+    half: Array = model.prediction_band(data).half
+    return half
 
 
 def _shown(model: IdentifiedModel, data: Dataset | None) -> tuple[Dataset, Response]:
@@ -354,7 +386,8 @@ def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
         plot_loop(record.data, run, part.add_subplot(grid[:, 0]))
         above = part.add_subplot(grid[0, 1])
         below = part.add_subplot(grid[1, 1], sharex=above)
-        plot_time(record.data, run, (above, below), stroke=record.stroke)
+        half = band_of(fit, record.data)
+        plot_time(record.data, run, (above, below), stroke=record.stroke, half=half)
         part.suptitle(what_was_fitted(fit, record), fontsize="large")
     plot_convergence(fit, parts[count, 0].subplots())
     return whole(figure)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..fitted.identification import Identification
     from ..fitted.identified_model import IdentifiedModel
 
-__all__ = ["errors_of", "errors_of_file", "of_sensor", "of_stage", "rows"]
+__all__ = ["errors_of", "errors_of_file", "of_sensor", "of_stage", "predicted", "rows"]
 
 Row = tuple[str, str]
 
@@ -149,7 +149,35 @@ def errors_of_file(model: IdentifiedModel) -> list[Row]:
     if math.isnan(cost := number("cost")):
         return []
     largest = number("max_error"), number("max_error_time")
-    return _errors(cost, model.stroke, largest, number("noise"), number("fit_percent"))
+    rows = _errors(cost, model.stroke, largest, number("noise"), number("fit_percent"))
+    return [*rows, *predicted(model)]
+
+
+def predicted(model: IdentifiedModel) -> list[Row]:
+    """Return the error that is expected on another cycle, and whether model or sensor limits it.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+
+    Returns
+    -------
+    list of (str, str)
+        Two rows; the second where the drive repeats, and none where nothing is known.
+    """
+    if (covariance := model.covariance) is None:
+        return []
+    within = f"within {length_text(covariance.predicted, 3)} (95 %) on another cycle like these"
+    if (shares := covariance.shares) is None:
+        return [("predicted", within)]
+    noise = f"noise {length_text(shares.noise, 3)}"
+    repeats = f"{length_text(shares.model_error, 3)} repeats in every period"
+    if shares.model_error > shares.noise:
+        limit = f"the model: {repeats}, which no interval covers; {noise}"
+    else:
+        limit = f"the sensor: {noise}; {repeats}"
+    return [("predicted", within), ("limit", limit)]
 
 
 def _loop(model: IdentifiedModel) -> list[Row]:

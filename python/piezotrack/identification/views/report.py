@@ -12,7 +12,7 @@ from ..methods.descents import Descents
 from ..methods.least_squares import LeastSquares
 from ..methods.particle_swarm import ParticleSwarm
 from .confidence.residual_report import fit_notes
-from .quantities import errors_of, errors_of_file, of_sensor, of_stage, rows
+from .quantities import errors_of, errors_of_file, of_sensor, of_stage, predicted, rows
 
 if TYPE_CHECKING:
     import os
@@ -126,10 +126,10 @@ def model_text(model: IdentifiedModel) -> str:
 def _of_one(fit: Identification) -> list[str]:
     """Say from which record, and what is left of it."""
     data, record = fit.data, fit.records[0]
-    of_record = [*of_sensor(record, data), *errors_of(fit, 0), ("record", _size(data))]
+    of_record = [*of_sensor(record, data), *errors_of(fit, 0), *predicted(fit)]
     return [
         f"{fit.model.info.title}: stage identified from {data.source or 'a record'}",
-        *rows([*of_stage(fit), *of_record]),
+        *rows([*of_stage(fit), *of_record, ("record", _size(data))]),
     ]
 
 
@@ -141,7 +141,7 @@ def _of_several(fit: Identification) -> list[str]:
     )
     lines = [
         f"{fit.model.info.title}: stage identified from {len(fit.records)} records",
-        *rows([*of_stage(fit), ("rms error", rms)]),
+        *rows([*of_stage(fit), ("rms error", rms), *predicted(fit)]),
     ]
     for i, record in enumerate(fit.records):
         if record.data is None:
@@ -231,7 +231,7 @@ def verdict_sentences(fit: Identification) -> list[str]:
     Returns
     -------
     list of str
-        Sentences; after least squares only what no interval covers.
+        Sentences; after least squares only which values the error of the model decides.
     """
     if not fit.parameters:
         return [one for one in _certainty(fit) if one]
@@ -269,16 +269,11 @@ def list_sentences(fit: IdentifiedModel) -> list[str]:
 
 
 def _certainty(fit: Identification) -> list[str]:
-    """Say what of the residual no interval covers, and which values the model decides."""
+    """Say which values the error of the model decides."""
     covariance = fit.covariance
     if covariance is None:
         return []
     lines: list[str] = []
-    if (shares := covariance.shares) is not None:
-        lines.append(
-            f"{length_text(shares.model_error, 3)} of the residual repeats in every period, which "
-            f"no interval covers; noise {length_text(shares.noise, 3)}."
-        )
     decided = [name for name in covariance.decided_by_model if name in fit.parameters]
     if decided:
         lines.append(f"The error of the model, not the noise, decides: {', '.join(decided)}.")
@@ -404,14 +399,14 @@ def _row(fit: Identification, name: str, estimate: Estimate, width: int) -> str:
     elif estimate.deviation == 0.0:
         note = "held"
     elif estimate.deviation is None:
-        note = "unknown"
+        note = "" if estimate.at_bound else "unknown"
     elif not math.isfinite(estimate.deviation):
         note = "no effect on the data"
     else:
         share = 100 * estimate.deviation / abs(estimate.value) if estimate.value else math.inf
         digits = f"{share:.2g}" if share < 10 else f"{share:.0f}"
         note = f"{digits} %" if share < 100 else "larger than the value"
-    note += parameter_notes(fit, name)
+    note = (note + parameter_notes(fit, name)).removeprefix(", ")
     return (
         f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
     ).rstrip()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.special import stdtrit
 
 from ... import _core
 from ..._support.statistics import sample_noise
+from ..confidence.sensitivity import fitted_values, sensitivity
 from ..fitted.start import begin, same_beginning, start_after, start_at_jump
 from .correlated import Autoregression
 from .health import Change
@@ -142,7 +144,7 @@ class Judgement:
         """Half widths of the intervals, for noise, for the model's own record and its error."""
         process = Autoregression(left, whole.shape[1])
         spread = _deviations(columns, left)
-        own = math.sqrt(1.0 + self._own_share(float(np.sqrt(np.mean(left**2)))))
+        spread = np.hypot(spread, self._of_model(whole, spread))
         quantile = self.quantile(process.effective - whole.shape[1])
         widths = {}
         for i, name in enumerate(names):
@@ -150,19 +152,31 @@ class Judgement:
             alone = columns[:, i] - others @ _solved(others, columns[:, i])
             size = float(np.sqrt(np.mean(alone**2)))
             error = self.known.model_error / size if size > 0.0 else math.inf
-            widths[name] = quantile * own * float(spread[i]) + error
+            widths[name] = quantile * float(spread[i]) + error
         if "drift" in widths and self.model.drift:
             # A sensor that drifted along its own record may do so again.
             widths["drift"] += abs(self.model.drift.moved)
         return widths
 
-    def _own_share(self, left: float) -> float:
-        """Variance that the record identified adds, over that of this one."""
-        known = self.known
-        if not left > 0.0:
-            return 0.0
-        longer = 1.0 if known.duration is None else self.data.duration / known.duration
-        return longer * (known.rms / left) ** 2
+    def _of_model(self, whole: Array, spread: Array) -> Array:
+        """Return the standard deviations of the changes for the covariance of the model.
+
+        Of a model without a covariance they are as of one identified from this record.
+        """
+        covariance = self.model.covariance
+        if covariance is None:
+            return spread
+        scale = np.linalg.norm(whole, axis=0)
+        scale[scale == 0.0] = 1.0
+        changes = self._effects @ (np.linalg.pinv(whole / scale, rcond=1e-12).T / scale)[:, 1:]
+        # As its intervals are, wider than those of normal deviations.
+        sizes = covariance.widening[:, None] * changes
+        return np.asarray(np.sqrt(np.maximum(np.sum(sizes * (covariance.matrix @ sizes), 0), 0.0)))
+
+    @cached_property
+    def _effects(self) -> Array:
+        """Change of the displacement with each value of the model, shape (p, n) [m/...]."""
+        return sensitivity(self.model, self.data, fitted_values(self.model)).columns
 
     def quantile(self, freedom: float) -> float:
         """Half width of an interval in standard deviations, for all of the result at once."""

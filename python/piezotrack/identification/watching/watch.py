@@ -28,7 +28,7 @@ def watch(model: IdentifiedModel, record: Dataset, *, refit: bool = False) -> He
     Changes of gain, hysteresis, mode, lag, delay and drift are fitted to the residual of the
     record, by Gauss-Newton steps of the model. Their standard deviations are those of least squares
     with a correlated residual, by its autoregression (Domowitz and White 1982, doi
-    10.1016/0304-4076(82)90012-3), enlarged by that of the record identified, whose duration counts.
+    10.1016/0304-4076(82)90012-3), enlarged by what the covariance of the model makes of each.
     The model itself is inexact: of its own residual what is not noise,
     :math:`\sqrt{e^2 - \sigma^2}`, may be a change wholly, so each interval is wider by that over
     the rms of what the change moves and nothing else does. The intervals hold at once, by

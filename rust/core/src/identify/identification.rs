@@ -1,10 +1,10 @@
-//! Identification of a stage from a record: bounds, search, local refinement, standard deviations.
+//! Identification of a stage from a record: bounds, search, local refinement.
 
 use super::cost::evaluator::Evaluator;
 use super::cost::residual_sums::Costs;
 use super::cost::several_records::Records;
 use super::descent::lag::{LagRange, lag_range};
-use super::descent::levenberg_marquardt::{LocalRefinement, Sensitivity};
+use super::descent::levenberg_marquardt::LocalRefinement;
 use super::parameters::bounds::measures;
 use super::parameters::candidate::{Point, Theta};
 use super::problem::{Problem, Spec};
@@ -39,8 +39,9 @@ pub struct Identification {
     pub agreeing: usize,
     /// Lags that fit as well as the one of the best run, where the drive is slow.
     pub lags: Option<LagRange>,
-    /// Standard deviation of each free parameter; empty where the search was stopped.
-    pub sensitivities: Vec<Sensitivity>,
+    /// Record, 0 for what they share, and parameter of each that lies on a bound; empty where the
+    /// search was stopped.
+    pub at_bound: Vec<(usize, usize)>,
 }
 
 /// Quantities of one of the records in the best run.
@@ -54,7 +55,7 @@ pub struct OwnResult {
     pub costs: Costs,
 }
 
-/// Identifies a stage from a record: swarms, optional local refinement, standard deviations.
+/// Identifies a stage from a record: swarms or descents, local refinement.
 ///
 /// # Errors
 /// [`crate::Error::Parameter`] for a specification or setting that cannot be used,
@@ -133,7 +134,7 @@ pub fn identify_together(
     if matches!(plan.method, Method::Swarm(_)) {
         agreeing = agreeing_with(&runs, &records);
     }
-    let Told { lags, sensitivities, with_mass } =
+    let Told { lags, at_bound, with_mass } =
         best.filter(|_| ended).map(|i| told_by(&local, &mut runs[i], polish)).unwrap_or_default();
     if stop() {
         for run in &mut runs {
@@ -148,17 +149,11 @@ pub fn identify_together(
         let own = |(problem, (theta, costs))| OwnResult { problem, theta, costs };
         searched.into_iter().zip(each).map(own).collect()
     });
-    Ok(Identification {
-        problem,
-        stepping,
-        records: owns,
-        runs,
-        best,
-        agreeing,
-        lags,
-        sensitivities,
-    })
+    Ok(Identification { problem, stepping, records: owns, runs, best, agreeing, lags, at_bound })
 }
+
+/// Distance from a bound, in the unit box, that counts as on it.
+const NEAR: f64 = 1e-3;
 
 /// Rows that descents are made on, about.
 const ROWS: usize = 2000;
@@ -192,22 +187,21 @@ fn agreeing_with(runs: &[Outcome], records: &Records<'_>) -> usize {
 #[derive(Default)]
 struct Told {
     lags: Option<LagRange>,
-    sensitivities: Vec<Sensitivity>,
+    at_bound: Vec<(usize, usize)>,
     /// The problems with the mass free, where the records show it.
     with_mass: Option<Vec<Problem>>,
 }
 
-/// Standard deviations of a candidate; of a `polished` one first the mass is taken where the record
-/// shows it, else under a slow drive the least lag that fits.
+/// What a candidate lies on; of a `polished` one first the mass is taken where the record shows it,
+/// else under a slow drive the least lag that fits.
 fn told_by(local: &LocalRefinement<'_>, run: &mut Outcome, polished: bool) -> Told {
     if polished && let Some((problems, polished)) = with_mass(local, &run.place, run.costs) {
         run.polish_evaluations += polished.evaluations;
         (run.place, run.costs) = (polished.place, polished.costs);
         let records = local.records.of(&problems);
         run.theta = records.theta(&run.place);
-        let freed = LocalRefinement { records: &records, ..*local };
-        let sensitivities = freed.sensitivities(&run.place, run.costs);
-        return Told { sensitivities, with_mass: Some(problems), lags: None };
+        let at_bound = on_bounds(&records, &run.place);
+        return Told { at_bound, with_mass: Some(problems), lags: None };
     }
     let slow = polished && local.records.problem().slow;
     let lags = slow.then(|| lag_range(local, &run.place, run.costs)).flatten();
@@ -216,8 +210,14 @@ fn told_by(local: &LocalRefinement<'_>, run: &mut Outcome, polished: bool) -> To
         run.theta = local.records.theta(&run.place);
         run.polish_evaluations += found.evaluations;
     }
-    let sensitivities = local.sensitivities(&run.place, run.costs);
-    Told { lags, sensitivities, with_mass: None }
+    Told { lags, at_bound: on_bounds(local.records, &run.place), with_mass: None }
+}
+
+/// Coordinates of a place that lie on a bound.
+fn on_bounds(records: &Records<'_>, place: &[f64]) -> Vec<(usize, usize)> {
+    let inside = NEAR..=1.0 - NEAR;
+    let each = records.coordinates().iter().zip(place);
+    each.filter(|(_, z)| !inside.contains(z)).map(|(&which, _)| which).collect()
 }
 
 /// Bytes of a thread for each sample: five motions' columns in the refinement.

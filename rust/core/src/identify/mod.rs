@@ -5,6 +5,7 @@ mod descent;
 mod experiments;
 mod identification;
 mod inference;
+mod intervals;
 mod least_squares;
 mod parameters;
 mod problem;
@@ -17,7 +18,7 @@ pub use cost::journal::Journal;
 pub use cost::residual_sums::Costs;
 pub use cost::several_records::Records;
 pub use descent::lag::LagRange;
-pub use descent::levenberg_marquardt::{LocalRefinement, Polished, Sensitivity};
+pub use descent::levenberg_marquardt::{LocalRefinement, Polished};
 pub use experiments::cross_talk::{CrossTalk, cross_talk};
 pub use experiments::sensor_noise::{Noise, noise_at_rest};
 pub use experiments::step_response::{
@@ -25,6 +26,8 @@ pub use experiments::step_response::{
 };
 pub use identification::{Identification, OwnResult, identify, identify_together};
 pub use inference::{Autoregression, Covariance, Linearised, covariance};
+pub use intervals::chain::ProfilePoint;
+pub use intervals::profile::{Profile, Profiles};
 pub use least_squares::{
     CreepKind, DynamicsKind, LeastSquaresFit, NodesKind, RecordFit, Settings as WeightsSettings,
     Structure, WeightsDelay, WeightsRecord, identify_weights,

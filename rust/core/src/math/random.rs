@@ -57,6 +57,11 @@ impl Draws {
         Self::at(seed, SENSOR, sample, 0, 1).two_normals()[0]
     }
 
+    /// The next normal deviate.
+    pub(crate) fn normal_deviate(&mut self) -> f64 {
+        self.two_normals()[0]
+    }
+
     /// Jitter of one control sample, in units of the mean.
     pub(crate) fn jitter(seed: u64, sample: u64) -> f64 {
         Self::at(seed, LATENESS, sample, 0, 1).exponential()

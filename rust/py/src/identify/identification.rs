@@ -44,8 +44,8 @@ struct Estimate {
     value: f64,
     /// Bounds of the search; None for a parameter that was held.
     bounds: Option<(f64, f64)>,
-    /// Standard deviation; None where it was not computed, infinite where the value has no effect.
-    deviation: Option<f64>,
+    /// Whether it is held as the records do not show it.
+    not_shown: bool,
     at_bound: bool,
     /// How the search went through the bounds; None for a parameter that was not searched.
     scale: Option<&'static str>,
@@ -212,7 +212,6 @@ impl PySearch {
         let OwnResult { problem, theta, .. } = self.found.records.get(r)?;
         // A mass that the record does not show is held where it has no effect.
         let held = problem.mass_if_shown.is_some();
-        let unseen = (held && name == "mass").then_some(f64::INFINITY);
         let (bounds, scale) = match problem.coordinates[place] {
             Coordinate::Fixed(_) | Coordinate::Tied => (None, None),
             Coordinate::Free { low, high, scale } => (Some((low, high)), Some(scale.name())),
@@ -220,14 +219,12 @@ impl PySearch {
         let Relations { ties, priors, .. } = &problem.relations;
         let tie = ties.iter().find(|tie| tie.parameter == place);
         let prior = priors.iter().find(|prior| prior.parameter == place);
-        let mut all = self.found.sensitivities.iter();
-        let found = all.find(|found| (found.record, found.parameter) == (r, place));
         Some(Estimate {
             name,
             value: theta.0[place],
             bounds,
-            deviation: found.map(|found| found.deviation).or(unseen),
-            at_bound: found.is_some_and(|found| found.at_bound),
+            not_shown: held && name == "mass",
+            at_bound: self.found.at_bound.contains(&(r, place)),
             scale,
             tie: tie.map(|tie| tie.text.clone()),
             prior: prior.map(|prior| (prior.mean, prior.width)),

@@ -5,6 +5,7 @@ pub mod covariance;
 pub mod descents;
 pub mod identification;
 pub mod least_squares;
+pub mod local_fit;
 pub mod objective;
 pub mod problem;
 pub mod step;

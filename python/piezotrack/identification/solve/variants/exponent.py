@@ -31,8 +31,9 @@ __all__ = ["with_exponent_tried"]
 MODEL, NAME = "bouc-wen", "exponent"
 # Range of the exponent, and the factor from one to the next.
 LEAST, MOST, STEP = 1.2, 4.5, 1.15
-# Factor beside the best one of a thinned record with which it is found in the whole record.
-BESIDE = 1.03
+# Factor beside the best one of a thinned record with which it is found in the whole record, and how
+# often it is applied at most.
+BESIDE, MOST_BESIDE = 1.03, 8
 # A residual of so many times the noise has nothing but noise in it.
 NOISY = 1.05
 # Parameters whose unit the exponent decides.
@@ -160,7 +161,13 @@ class _Profile:
         n, self.problem, self.costs = self.n, problem, {}
         for at in (n, n / BESIDE, n * BESIDE):
             self.descend(n, min(at, MOST))
-        self.n = self.vertex(min(self.costs, key=self.costs.__getitem__))
+        for _ in range(MOST_BESIDE):
+            n = min(self.costs, key=self.costs.__getitem__)
+            beyond = n * BESIDE if n == max(self.costs) else n / BESIDE
+            if min(self.costs) < n < max(self.costs) or not LEAST < beyond < MOST:
+                break
+            self.descend(n, beyond)
+        self.n = self.vertex(n)
 
     def vertex(self, n: float) -> float:
         """Return the exponent at the vertex of a parabola through the best one and those beside."""

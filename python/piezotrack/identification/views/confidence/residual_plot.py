@@ -23,7 +23,7 @@ from ...._support.display.plot_style import (
     whole,
 )
 from ...._support.units import best_length_unit, drive_word, shown_unit
-from ...confidence.residual import residual_of
+from ...confidence.residuals.residual import residual_of
 from .residual_report import verdict
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
-    from ...confidence.residual import Residual, ResidualProfile
+    from ...confidence.residuals.residual import Residual, ResidualProfile
     from ...fitted.identification import Identification
 
     Array = NDArray[np.float64]

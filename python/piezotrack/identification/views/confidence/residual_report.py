@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...._support.units import length_text
-from ...confidence.residual import residual_of
+from ...confidence.residuals.residual import residual_of
 
 if TYPE_CHECKING:
-    from ...confidence.residual import Residual
+    from ...confidence.residuals.residual import Residual
     from ...fitted.identification import Identification
 
 __all__ = ["fit_notes", "residual_text", "verdict"]

@@ -21,7 +21,7 @@ from ...._support.units import drive_word, length_text, shown_unit
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
-    from ...confidence.suggested_drive import SuggestedDrive
+    from ...confidence.suggestion.suggested_drive import SuggestedDrive
 
 __all__ = ["plot_suggested"]
 

@@ -11,7 +11,7 @@ from ...._support.display.table import Column, Table
 from ...._support.units import length_text, shown_unit
 
 if TYPE_CHECKING:
-    from ...confidence.suggested_drive import ExpectedDeviation, SuggestedDrive
+    from ...confidence.suggestion.suggested_drive import ExpectedDeviation, SuggestedDrive
 
 __all__ = ["suggested_text"]
 

@@ -12,8 +12,8 @@ from ...._support.page.parts import Listing, Picture, Section, Sentences
 from ...._support.units import length_text, of_drive, shown_unit
 from ..confidence.residual_report import fit_notes
 from ..html import records_table
-from ..plot import plot_loop, plot_time, what_was_fitted
-from ..quantities import errors_of, of_sensor, of_stage
+from ..plot import band_of, plot_loop, plot_time, what_was_fitted
+from ..quantities import errors_of, of_sensor, of_stage, predicted
 from ..report import list_sentences, parameter_notes, search_sentences, verdict_sentences
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def overview(fit: Identification) -> Section:
         share = f"{fit.cost_percent:.3g} % of the largest stroke"
         rows.append(("rms error", f"{length_text(fit.cost, 3)} of all records ({share})"))
         rows.append(("fit", f"{fit.fit_percent:.4g} % of the motion"))
-    return Section("", (words("", [*rows, *_validation(fit)]),))
+    return Section("", (words("", [*rows, *predicted(fit), *_validation(fit)]),))
 
 
 def _window(data: Dataset) -> str:
@@ -123,7 +123,8 @@ def _time(fit: Identification) -> Picture:
     def draw(figure: Figure | SubFigure) -> None:
         run = fit.simulate(fit.data, offset=fit.offset)
         above, below = figure.subplots(2, 1, sharex=True)
-        plot_time(fit.data, run, (above, below), stroke=fit.stroke)
+        half = band_of(fit, fit.data)
+        plot_time(fit.data, run, (above, below), stroke=fit.stroke, half=half)
 
     return Picture("time", draw, 3.6, "displacement and error over time")
 
@@ -137,7 +138,7 @@ def _both(fit: Identification, record: FittedRecord, figure: Figure | SubFigure)
     plot_loop(data, run, figure.add_subplot(grid[:, 0]))
     above = figure.add_subplot(grid[0, 1])
     below = figure.add_subplot(grid[1, 1], sharex=above)
-    plot_time(data, run, (above, below), stroke=record.stroke)
+    plot_time(data, run, (above, below), stroke=record.stroke, half=band_of(fit, data))
     below.set_title(below.get_title().removeprefix("error = measured - simulated: "), fontsize=8)
     figure.suptitle(what_was_fitted(fit, record), fontsize="medium")
 
@@ -181,7 +182,8 @@ def _remark(estimate: Estimate) -> str:
         return "no effect on the data" if moves else "held: no effect on the data"
     if not moves or estimate.deviation == 0.0:
         return "held"
-    return "" if estimate.deviation is not None else "interval unknown"
+    known = estimate.deviation is not None or estimate.at_bound
+    return "" if known else "interval unknown"
 
 
 def _values(fit: Identification) -> Table:

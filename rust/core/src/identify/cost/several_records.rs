@@ -48,7 +48,7 @@ impl<'a> Records<'a> {
 
     /// Several, with the weights that they have; their problems share the coordinates of the stage.
     #[must_use]
-    pub(in crate::identify) fn new(evaluators: Vec<Evaluator<'a>>) -> Self {
+    pub fn new(evaluators: Vec<Evaluator<'a>>) -> Self {
         let counts = |one: &Evaluator<'_>| one.record().weight * index(one.record().samples());
         let total: f64 = evaluators.iter().map(counts).sum();
         let samples = evaluators.iter().map(|one| one.record().samples()).sum();
@@ -116,8 +116,37 @@ impl<'a> Records<'a> {
     }
 
     /// Record and parameter of each coordinate.
-    pub(in crate::identify) fn coordinates(&self) -> &[(usize, usize)] {
+    #[must_use]
+    pub fn coordinates(&self) -> &[(usize, usize)] {
         &self.coordinates
+    }
+
+    /// Values at a place, in the order of the coordinates.
+    #[must_use]
+    pub fn values(&self, place: &[f64]) -> Vec<f64> {
+        let of =
+            |&(record, parameter): &(usize, usize)| self.members[record].theta(place).0[parameter];
+        self.coordinates.iter().map(of).collect()
+    }
+
+    /// The place nearest to values, in the order of the coordinates.
+    #[must_use]
+    pub fn place(&self, values: &[f64]) -> Vec<f64> {
+        let known = |parameter: usize| {
+            let mut all = self.coordinates.iter().zip(values);
+            let free = all.find(|((record, other), _)| (*record, *other) == (0, parameter));
+            let held = self.problem().coordinates[parameter].value(0.5);
+            free.map_or(held, |(_, value)| *value)
+        };
+        let of = |(&(record, parameter), &value): (&(usize, usize), &f64)| {
+            let problem = self.members[record].evaluator.problem();
+            let above = problem.relations.constraints.iter().filter(|one| one.lower == parameter);
+            let limited = above.fold(problem.coordinates[parameter], |coordinate, one| {
+                coordinate.limited(known(one.upper))
+            });
+            limited.place(value)
+        };
+        self.coordinates.iter().zip(values).map(of).collect()
     }
 
     /// Samples in the windows of all records.

@@ -2,9 +2,9 @@
 
 pub(super) mod acceleration;
 pub(super) mod damped_step;
-pub(super) mod information;
 pub(super) mod jacobian;
 pub(super) mod lag;
 pub(super) mod levenberg_marquardt;
 pub(super) mod neighbourhood;
 pub(super) mod normal;
+pub(super) mod priors;

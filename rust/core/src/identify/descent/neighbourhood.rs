@@ -1,8 +1,8 @@
 //! Normal equations of all records at a place, with the curvature along the steps from it.
 
 use super::acceleration::Neighbourhood;
-use super::information::add_priors;
 use super::normal::{Block, Extended, Normal, STEPS, Spot};
+use super::priors::add_priors;
 use crate::identify::cost::journal::remembered;
 use crate::identify::cost::several_records::{Member, Records};
 use crate::identify::records::creep_weights::CreepWeights;
@@ -17,20 +17,19 @@ const FEWEST_TOGETHER: usize = 4;
 
 impl Records<'_> {
     /// Normal equations at a place with its weights of the creep, by central differences, with the
-    /// priors, for which the mean square of the deviations times `samples_over_freedom` is the
-    /// variance of one; `None` where a neighbour cannot be simulated.
+    /// priors, for which the mean square of the deviations is the variance of one; `None` where a
+    /// neighbour cannot be simulated.
     pub(in crate::identify) fn normal(
         &self,
         place: &[f64],
         creep_weights: CreepWeights,
-        samples_over_freedom: f64,
         stop: Stop<'_>,
     ) -> Option<Normal> {
         let block = |one: &Member<'_>| one.evaluator.central(&one.own(place), creep_weights, stop);
         let computed = || {
             let blocks: Option<Vec<Block>> = self.members().iter().map(block).collect();
             let joined = blocks.map(|all| Extended::of(self.members(), &all, place.len()));
-            vec![joined.map(|joined| self.with_priors(place, &joined, samples_over_freedom))]
+            vec![joined.map(|joined| self.with_priors(place, &joined))]
         };
         remembered(self.journal(), (1, place.len()), stop, computed).pop().flatten()
     }
@@ -64,7 +63,8 @@ impl Records<'_> {
         let local = |(spot, blocks): (&Spot, Option<Vec<Block>>)| {
             let blocks = blocks?;
             let extended = Extended::of(self.members(), &blocks, spot.place.len());
-            let normal = self.with_priors(&spot.place, &extended, 1.0);
+            let mut normal = self.with_priors(&spot.place, &extended);
+            spot.held.into_iter().for_each(|coordinate| normal.hold(coordinate));
             Some(Neighbourhood { blocks, extended, normal })
         };
         let local: Vec<Option<Neighbourhood>> = spots.iter().zip(all).map(local).collect();
@@ -72,12 +72,11 @@ impl Records<'_> {
     }
 
     /// The equations about the best weights of the creep, with the priors.
-    fn with_priors(&self, place: &[f64], of: &Extended, samples_over_freedom: f64) -> Normal {
+    fn with_priors(&self, place: &[f64], of: &Extended) -> Normal {
         let (mut square, mut slope) = of.eliminated(&of.slope);
-        let (rows, squares) = (of.rows, of.squares);
         // Some rows stand for all samples, and weigh less against the priors by their share.
-        let variance = squares / index(self.samples()) * samples_over_freedom;
+        let variance = of.squares / index(self.samples());
         add_priors(self, place, variance, &mut square, &mut slope);
-        Normal { square, slope, rows, bends: [const { None }; STEPS] }
+        Normal { square, slope, bends: [const { None }; STEPS] }
     }
 }

@@ -20,11 +20,18 @@ pub(in crate::identify) struct Normal {
     pub square: DMatrix<f64>,
     /// J^T r, r being measured less simulated.
     pub slope: DVector<f64>,
-    /// Samples that entered.
-    pub rows: usize,
     /// `J^T x_vv` with the second derivative of the displacement x along each step that was asked for;
     /// none of a step that could not be simulated.
     pub bends: [Option<DVector<f64>>; STEPS],
+}
+
+impl Normal {
+    /// Takes a coordinate out, which then stays as it is.
+    pub fn hold(&mut self, coordinate: usize) {
+        self.square.fill_row(coordinate, 0.0);
+        self.square.fill_column(coordinate, 0.0);
+        self.slope[coordinate] = 0.0;
+    }
 }
 
 /// Where normal equations are asked for.
@@ -33,17 +40,19 @@ pub(in crate::identify) struct Spot {
     pub creep_weights: CreepWeights,
     /// Dampings of the steps along which the curvature is asked for.
     pub dampings: [f64; STEPS],
+    /// Coordinate that stays as it is.
+    pub held: Option<usize>,
 }
 
-/// First the rows, -1 where a neighbour could not be simulated; NaN for bends that there are not.
+/// First 1, or -1 where a neighbour could not be simulated; NaN for bends that there are not.
 impl Answer for Option<Normal> {
     fn length(coordinates: usize) -> usize {
         1 + coordinates * (1 + coordinates + STEPS)
     }
 
     fn write(&self, numbers: &mut Vec<f64>, coordinates: usize) {
-        if let Some(Normal { square, slope, rows, bends }) = self {
-            numbers.push(index(*rows));
+        if let Some(Normal { square, slope, bends }) = self {
+            numbers.push(1.0);
             numbers.extend(slope.iter());
             numbers.extend(square.iter());
             let none = DVector::from_element(coordinates, f64::NAN);
@@ -57,26 +66,19 @@ impl Answer for Option<Normal> {
     }
 
     fn read(numbers: &[f64], coordinates: usize) -> Self {
-        let (&rows, rest) = numbers.split_first()?;
+        let (&first, rest) = numbers.split_first()?;
         let (slope, rest) = rest.split_at_checked(coordinates)?;
         let (square, bends) = rest.split_at_checked(coordinates * coordinates)?;
         let bend = |i: usize| {
             let bend = bends.get(i * coordinates..(i + 1) * coordinates)?;
             (!bend.iter().any(|value| value.is_nan())).then(|| DVector::from_column_slice(bend))
         };
-        if rows < 0.0 {
+        if first < 0.0 {
             return None;
         }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a count, written above"
-        )]
-        let rows = rows as usize;
         Some(Normal {
             square: DMatrix::from_column_slice(coordinates, coordinates, square),
             slope: DVector::from_column_slice(slope),
-            rows,
             bends: core::array::from_fn(bend),
         })
     }
@@ -110,7 +112,7 @@ pub(in crate::identify) struct Extended {
     /// Sum of r^2.
     pub squares: f64,
     /// Samples that entered.
-    pub rows: usize,
+    rows: usize,
     /// Coordinates without the directions.
     count: usize,
 }

@@ -86,7 +86,7 @@ pub fn covariance(
     let mut bins = Vec::with_capacity(records.len());
     for one in &projected {
         let spectra = Spectra::of(one, b);
-        matrix += spectra.covariance(&one.noise) * (scale * one.weight * one.weight);
+        matrix += spectra.covariance(&one.sieve.noise) * (scale * one.weight * one.weight);
         bins.push(spectra.bins());
     }
     let bins = Bins::of(bins, &projected, &matrix, scale);
@@ -99,7 +99,7 @@ pub fn covariance(
         shifts,
         steps: (b * slope).iter().copied().collect(),
         resampled,
-        orders: projected.iter().map(|one| one.noise.coefficients.len()).collect(),
+        orders: projected.iter().map(|one| one.sieve.noise.coefficients.len()).collect(),
     })
 }
 
@@ -251,15 +251,17 @@ fn shifts(
     let mut square = precision * 1.0;
     let mut slope = DVector::zeros(count);
     for (record, one) in records.iter().zip(projected) {
-        let noise = if one.noise.variance > 0.0 { one.noise.variance } else { variance };
+        let noise =
+            if one.sieve.noise.variance > 0.0 { one.sieve.noise.variance } else { variance };
         let white = |columns: &[Vec<f64>]| {
-            let columns: Vec<Vec<f64>> = columns.iter().map(|c| one.noise.innovations(c)).collect();
+            let columns: Vec<Vec<f64>> =
+                columns.iter().map(|c| one.sieve.noise.innovations(c)).collect();
             let rows = columns.first().map_or(0, Vec::len);
             DMatrix::from_fn(rows, columns.len(), |t, i| columns[i][t])
         };
         let basis = orthonormal(white(&record.nuisance));
         let columns = without(&basis, white(&record.columns));
-        let residual = DVector::from_vec(one.noise.innovations(&record.residual));
+        let residual = DVector::from_vec(one.sieve.noise.innovations(&record.residual));
         square += columns.tr_mul(&columns) / noise;
         slope += columns.tr_mul(&residual) / noise;
     }

@@ -2,8 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::autoregression::Autoregression;
-use crate::signal::index;
+use super::sieve::Sieve;
 
 /// Share of an eigenvalue below which its direction does not change the displacement.
 pub(super) const ROUNDING: f64 = 1e-10;
@@ -29,8 +28,7 @@ pub(super) struct Projected {
     pub columns: DMatrix<f64>,
     /// An orthonormal basis of the nuisance.
     pub nuisance: DMatrix<f64>,
-    pub noise: Autoregression,
-    pub innovations: Vec<f64>,
+    pub sieve: Sieve,
     pub weight: f64,
 }
 
@@ -40,9 +38,7 @@ pub(super) fn project(record: &Linearised) -> Projected {
     let of = |columns: &[Vec<f64>]| DMatrix::from_fn(n, columns.len(), |t, i| columns[i][t]);
     let nuisance = orthonormal(of(&record.nuisance));
     let columns = without(&nuisance, of(&record.columns));
-    let noise = Autoregression::of(&record.noise);
-    let innovations = centred(noise.innovations(&record.noise));
-    Projected { columns, nuisance, noise, innovations, weight: record.weight }
+    Projected { columns, nuisance, sieve: Sieve::of(&record.noise), weight: record.weight }
 }
 
 /// An orthonormal basis of columns, of those that are not a part of the others.
@@ -69,12 +65,4 @@ pub(super) fn without(basis: &DMatrix<f64>, mut columns: DMatrix<f64>) -> DMatri
         columns -= basis * parts;
     }
     columns
-}
-
-fn centred(mut values: Vec<f64>) -> Vec<f64> {
-    let mean = values.iter().sum::<f64>() / index(values.len().max(1));
-    for value in &mut values {
-        *value -= mean;
-    }
-    values
 }

@@ -5,7 +5,9 @@ mod covariance;
 mod fourier;
 mod linearised;
 mod resampling;
+mod sieve;
 
 pub use autoregression::Autoregression;
 pub use covariance::{Covariance, covariance};
 pub use linearised::Linearised;
+pub(in crate::identify) use sieve::Sieve;

@@ -10,9 +10,6 @@ use super::autoregression::Autoregression;
 use super::linearised::Projected;
 use crate::math::{Draws, on_all_threads};
 
-/// Samples of a noise before the record, most.
-const LEADING: usize = 1000;
-
 /// Power of what each value takes of the noise of each record, in bands of frequency.
 pub(super) struct Bins {
     records: Vec<Vec<(f64, Vec<f64>)>>,
@@ -29,7 +26,7 @@ impl Bins {
         scale: f64,
     ) -> Self {
         let mut bins = Self { records, corrections: vec![1.0; matrix.nrows()] };
-        let noises: Vec<&Autoregression> = projected.iter().map(|one| &one.noise).collect();
+        let noises: Vec<&Autoregression> = projected.iter().map(|one| &one.sieve.noise).collect();
         let rough = bins.variances(&noises, projected, scale);
         let over =
             |(i, rough): (usize, f64)| if rough > 0.0 { matrix[(i, i)] / rough } else { 1.0 };
@@ -94,14 +91,5 @@ pub(super) fn studentised(
 
 /// A noise from innovations drawn with replacement.
 fn resampled(record: &Projected, scale: f64, stream: &mut Draws) -> DVector<f64> {
-    let count = record.columns.nrows();
-    let leading = count.min(LEADING);
-    let known = &record.innovations;
-    if known.is_empty() {
-        return DVector::zeros(count);
-    }
-    let size = scale.sqrt();
-    let drawn: Vec<f64> =
-        (0..count + leading).map(|_| size * known[stream.below(known.len())]).collect();
-    DVector::from_vec(record.noise.noise(&drawn, leading))
+    DVector::from_vec(record.sieve.drawn(record.columns.nrows(), scale, stream))
 }

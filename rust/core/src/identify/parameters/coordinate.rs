@@ -94,6 +94,20 @@ impl Coordinate {
         }
     }
 
+    /// The place in [0, 1] of a parameter: the nearest one; 0 where it is not free.
+    #[must_use]
+    pub fn place(&self, value: f64) -> f64 {
+        let place = match *self {
+            Self::Tied | Self::Fixed(_) => 0.0,
+            Self::Free { low, high, scale: Scale::Linear } => (value - low) / (high - low),
+            Self::Free { low, high, scale: Scale::Log } => {
+                let (from, to) = (libm::log(low), libm::log(high));
+                (libm::log(value) - from) / (to - from)
+            }
+        };
+        if place.is_nan() { 0.0 } else { place.clamp(0.0, 1.0) }
+    }
+
     /// The coordinate with an upper bound that is no higher than this.
     #[must_use]
     pub(in crate::identify) fn limited(self, limit: f64) -> Self {

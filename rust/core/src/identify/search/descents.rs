@@ -49,6 +49,11 @@ struct Descent {
     place: Vec<f64>,
     costs: Costs,
     damping: f64,
+    /// Coordinate that stays as it is.
+    held: Option<usize>,
+    /// Share of the cost that is little for an iteration to gain, and most iterations.
+    little: f64,
+    most: usize,
     /// Iterations in a row that gained little.
     stalled: usize,
     evaluations: usize,
@@ -59,23 +64,35 @@ struct Descent {
 impl Descent {
     fn new(place: Vec<f64>, costs: Costs, evaluations: usize) -> Self {
         let history = vec![costs.rms];
-        Self { place, costs, damping: 1e-2, stalled: 0, evaluations, history, reason: None }
+        Self {
+            place,
+            costs,
+            damping: 1e-2,
+            held: None,
+            little: LITTLE,
+            most: ITERATIONS,
+            stalled: 0,
+            evaluations,
+            history,
+            reason: None,
+        }
     }
 
     /// Where it asks for normal equations, with the curvature along its steps.
     fn spot(&self) -> Spot {
         let dampings = DAMPINGS.map(|factor| factor * self.damping);
-        Spot { place: self.place.clone(), creep_weights: self.costs.creep_weights, dampings }
+        let (place, creep_weights) = (self.place.clone(), self.costs.creep_weights);
+        Spot { place, creep_weights, dampings, held: self.held }
     }
 
     /// Takes what an iteration gained.
     fn iterated(&mut self, before: f64) {
         let gained = before - self.costs.rms;
         self.history.push(self.costs.rms);
-        self.stalled = if gained <= LITTLE * before { self.stalled + 1 } else { 0 };
+        self.stalled = if gained <= self.little * before { self.stalled + 1 } else { 0 };
         if gained <= NOTHING * before || self.stalled >= 2 {
             self.reason = Some(StopReason::Converged);
-        } else if self.history.len() > ITERATIONS {
+        } else if self.history.len() > self.most {
             self.reason = Some(StopReason::Iterations);
         }
     }
@@ -162,21 +179,47 @@ pub(in crate::identify) fn descend(
     Ok(outcomes)
 }
 
+/// Start of a descent.
+#[derive(Clone, Debug)]
+pub(in crate::identify) struct Start {
+    pub place: Vec<f64>,
+    /// Coordinate that stays as it is.
+    pub held: Option<usize>,
+    /// Share of the cost: two iterations in a row that gain less are the last.
+    pub little: f64,
+    /// Most iterations.
+    pub most: usize,
+}
+
+impl Start {
+    /// A descent of all coordinates.
+    pub fn free(place: &[f64], little: f64) -> Self {
+        Self { place: place.to_vec(), held: None, little, most: ITERATIONS }
+    }
+}
+
 impl LocalRefinement<'_> {
     /// Descends from places of the unit box, side by side; the cost of one that could not be
     /// simulated is infinite.
     #[must_use]
     pub fn descended(&self, places: &[Vec<f64>]) -> Vec<Polished> {
+        let start = |place: &Vec<f64>| Start::free(place, LITTLE);
+        self.descended_from(&places.iter().map(start).collect::<Vec<_>>())
+    }
+
+    /// The same with coordinates that stay as they are.
+    pub(in crate::identify) fn descended_from(&self, starts: &[Start]) -> Vec<Polished> {
         let settings = DescentSettings::default();
         let mut search = Search::new(self, &settings);
-        let points: Vec<Point> = places.iter().map(|one| anywhere(one)).collect();
+        let points: Vec<Point> = starts.iter().map(|one| anywhere(&one.place)).collect();
         let costs = self.records.costs(&points, self.stop);
-        let start = |(place, costs): (&Vec<f64>, Costs)| {
-            let mut one = Descent::new(place.clone(), costs, 1);
+        let start = |(start, costs): (&Start, Costs)| {
+            let mut one = Descent::new(start.place.clone(), costs, 1);
+            (one.held, one.little, one.most) = (start.held, start.little, start.most);
             one.reason = costs.rms.is_infinite().then_some(StopReason::Converged);
             one
         };
-        let mut descents: Vec<Descent> = places.iter().zip(costs).map(start).collect();
+        let mut descents: Vec<Descent> = starts.iter().zip(costs).map(start).collect();
         while descents.iter().any(|one| one.reason.is_none()) && !(self.stop)() {
             search.iterate(&mut descents);
         }

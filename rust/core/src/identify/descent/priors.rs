@@ -1,4 +1,4 @@
-//! Terms of priors, ties and inequalities in the normal equations of a candidate.
+//! Terms of priors in the normal equations of a candidate.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,9 +6,6 @@ use crate::identify::cost::several_records::Records;
 
 /// Change of a coordinate of the unit box, for the differences.
 const CHANGE: f64 = 1e-4;
-
-/// Share of a direction below which it is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// Change of a parameter with each coordinate of the unit box, at a place.
 fn gradient(records: &Records<'_>, place: &[f64], parameter: usize) -> DVector<f64> {
@@ -41,34 +38,5 @@ pub(in crate::identify) fn add_priors(
             *slope += &gradient * (weight * (prior.mean - value));
             *square += &gradient * gradient.transpose() * weight;
         }
-    }
-}
-
-/// Normal equations, scaled to a diagonal of ones and decomposed.
-pub(in crate::identify) struct Spread<'a> {
-    /// Roots of the diagonal.
-    pub sizes: &'a [f64],
-    pub eigenvalues: &'a DVector<f64>,
-    pub eigenvectors: &'a DMatrix<f64>,
-    /// Standard deviation of a deviation, m.
-    pub noise: f64,
-}
-
-impl Spread<'_> {
-    /// Standard deviation of a parameter that depends on several coordinates, by propagation of
-    /// their covariance; infinite where it depends on one that has no effect.
-    pub fn of(&self, records: &Records<'_>, place: &[f64], parameter: usize) -> f64 {
-        let gradient = gradient(records, place, parameter);
-        let scaled = DVector::from_fn(gradient.len(), |d, _| {
-            if gradient[d] == 0.0 { 0.0 } else { gradient[d] / self.sizes[d] }
-        });
-        let length = scaled.norm();
-        let parts = self.eigenvectors.tr_mul(&scaled);
-        let part = |(part, value): (&f64, &f64)| {
-            if part.abs() <= ROUNDING * length { 0.0 } else { part * part / value.max(0.0) }
-        };
-        let variance: f64 = parts.iter().zip(self.eigenvalues.iter()).map(part).sum();
-        let spread = self.noise * variance.sqrt();
-        if spread.is_nan() { f64::INFINITY } else { spread }
     }
 }

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...errors import NumericalError, ParameterError
-from ..fitted.identified_model import IdentifiedModel
-from ..solve.weights import CHOSEN
-from .sensitivity import free_values, moved, sensitivity
+from ....errors import NumericalError, ParameterError
+from ...fitted.identified_model import IdentifiedModel
+from ...solve.weights import CHOSEN
+from ..sensitivity import free_values, moved, sensitivity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from ...stages.base import Stage
-    from ...stages.motion import StageState
-    from ..fitted.identification import Identification
-    from .sensitivity import Value
+    from ....stages.base import Stage
+    from ....stages.motion import StageState
+    from ...fitted.identification import Identification
+    from ..sensitivity import Value
 
     Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...data.checks.hum import hum_lines
+from ....data.checks.hum import hum_lines
 from .responses import late, relaxed, ringing
 from .situation import Explained, criterion, independent_samples
 

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...errors import NumericalError
-from .drive_blocks import SHORTEST, Block, Span, blocks_of, reach
+from ....errors import NumericalError
+from .blocks import SHORTEST, Block, Span, blocks_of, reach
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from ...stages.motion import StageState
-    from .drive_information import Truth
+    from ....stages.motion import StageState
+    from .information import Truth
 
     Array = NDArray[np.float64]
 

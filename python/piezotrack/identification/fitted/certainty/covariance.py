@@ -5,23 +5,41 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ... import _core
-from ..._support.messages import quoted
-from ...errors import ParameterError
+from .... import _core
+from ...._support.files.json_text import object_of
+from ...._support.messages import quoted
+from ....errors import ParameterError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["Covariance", "Interval", "NoiseShares"]
+__all__ = [
+    "Covariance",
+    "Interval",
+    "NoiseShares",
+    "covariance_entry",
+    "covariance_of_file",
+    "normal_reach",
+]
 
 # Correlation from which on a pair of values is named.
 CORRELATED = 0.95
+# Lists of a covariance with an entry for each value, as a model file has them.
+LISTS = (
+    "values",
+    "determined",
+    "independent",
+    "factors",
+    "widening",
+    "shifts",
+    "to_least_cost",
+)
 
 
 class Interval(NamedTuple):
@@ -78,6 +96,8 @@ class Covariance:
         Whether the records determine each value.
     independent : ndarray, shape (p,)
         Standard deviations for independent noise of the same size, SI.
+    factors : ndarray, shape (p,)
+        Variance of each value over that for an independent residual of the same size.
     widening : ndarray, shape (p,)
         Factor of the 95 % interval, by the bootstrap, over that of normal deviations.
     shifts : ndarray, shape (p, 2)
@@ -90,6 +110,9 @@ class Covariance:
         Samples of the records.
     orders : tuple of int
         Order of the autoregression of each record.
+    predicted : float
+        Half width in which 95 % of the errors are expected on a cycle like those of the records
+        that was not fitted, as `PredictionBand` has it by amplitude and rate [m].
     shares : NoiseShares or None
         Model error and noise of the first record, where its drive repeats three times or more.
 
@@ -117,11 +140,13 @@ class Covariance:
     matrix: Array
     determined: NDArray[np.bool_]
     independent: Array
+    factors: Array
     widening: Array
     shifts: Array
     to_least_cost: Array
     samples: int
     orders: tuple[int, ...]
+    predicted: float
     shares: NoiseShares | None = None
 
     @property
@@ -201,7 +226,7 @@ class Covariance:
             There is no such value, or `level` is no share.
         """
         place = self._place(name)
-        reach = float(self.widening[place] * _normal(level) * self.deviations[place])
+        reach = float(self.widening[place] * normal_reach(level) * self.deviations[place])
         ends = float(self.values[place]) + np.array([0.0, self.to_least_cost[place]])
         return Interval(float(ends.min()) - reach, float(ends.max()) + reach)
 
@@ -225,7 +250,7 @@ class Covariance:
         ParameterError
             `level` is no share.
         """
-        normal = _normal(level)
+        normal = normal_reach(level)
         variances = (gradient**2) * np.diag(self.matrix)
         if not self.determined[variances > 0.0].all():
             return math.inf
@@ -240,9 +265,113 @@ class Covariance:
         return self.names.index(name)
 
 
-def _normal(level: float) -> float:
-    """Quantile of a normal deviation's size."""
+def normal_reach(level: float) -> float:
+    """Return what the size of a standard normal deviation stays below with a probability.
+
+    Parameters
+    ----------
+    level : float
+        The probability, between 0 and 1.
+
+    Returns
+    -------
+    float
+        1.96 for 95 %.
+
+    Raises
+    ------
+    ParameterError
+        `level` is no such number.
+    """
     share = _core.as_number("level", level)
     if not 0.0 < share < 1.0:
         raise ParameterError("level", share, "a number between 0 and 1")
     return NormalDist().inv_cdf(0.5 + 0.5 * share)
+
+
+def covariance_entry(covariance: Covariance | None) -> dict[str, Any]:
+    """Entries of a model file on the covariance; none where there is none.
+
+    Parameters
+    ----------
+    covariance : Covariance or None
+        Of the values that were fitted.
+
+    Returns
+    -------
+    dict
+        Of numbers, texts, lists and dicts only, SI; of the matrix the lower triangle.
+    """
+    if covariance is None:
+        return {}
+    entry: dict[str, Any] = {
+        "names": list(covariance.names),
+        "matrix": [row[: i + 1].tolist() for i, row in enumerate(covariance.matrix)],
+        **{name: getattr(covariance, name).tolist() for name in LISTS},
+        "samples": covariance.samples,
+        "orders": list(covariance.orders),
+        "predicted": {"value": covariance.predicted, "unit": "m"},
+    }
+    if covariance.shares is not None:
+        parts = covariance.shares._asdict().items()
+        entry["shares"] = {name: {"value": value, "unit": "m"} for name, value in parts}
+    return {"covariance": entry}
+
+
+def covariance_of_file(entry: Any) -> Covariance | None:
+    """Read the covariance of a model file.
+
+    Parameters
+    ----------
+    entry : Any
+        What `covariance_entry` wrote; None where the file has none.
+
+    Returns
+    -------
+    Covariance or None
+        The covariance, its numbers as they were saved.
+
+    Raises
+    ------
+    ParameterError
+        The entry has another form, or a list another length.
+    """
+    if entry is None:
+        return None
+    found = object_of("covariance", entry)
+    names = [str(name) for name in found["names"]]
+    matrix = np.zeros((len(names), len(names)))
+    rows = found["matrix"]
+    if [len(row) for row in rows] != list(range(1, len(names) + 1)):
+        expected = f"the lower triangle of {len(names)} rows, one for each name"
+        raise ParameterError("covariance: matrix", f"{len(rows)} rows", expected, verb="has")
+    for i, row in enumerate(rows):
+        matrix[i, : i + 1] = matrix[: i + 1, i] = _numbers("matrix", row)
+    lists = {name: _numbers(name, found[name]) for name in LISTS}
+    for name, numbers in lists.items():
+        if numbers.shape != ((len(names), 2) if name == "shifts" else (len(names),)):
+            raise ParameterError(
+                f"covariance: {name}", f"{len(numbers)} entries", f"{len(names)}", verb="has"
+            )
+    shares = {
+        name: _core.as_number(f"covariance: {name}", part["value"])
+        for name, part in object_of("covariance: shares", found.get("shares")).items()
+    }
+    return Covariance(
+        names=tuple(names),
+        matrix=matrix,
+        **{**lists, "determined": lists["determined"] != 0.0},
+        samples=_core.as_count("covariance: samples", found["samples"]),
+        orders=tuple(_core.as_count("covariance: orders", order) for order in found["orders"]),
+        predicted=_core.as_number("covariance: predicted", found["predicted"]["value"]),
+        shares=NoiseShares(**shares) if shares else None,
+    )
+
+
+def _numbers(name: str, values: Any) -> Array:
+    """Take a list of numbers of a file; what is not finite is null there."""
+    numbers = np.array(values, dtype=np.float64)
+    finite = name not in ("determined", "independent", "shifts")
+    if finite and not np.isfinite(numbers).all():
+        raise ParameterError(f"covariance: {name}", "null", "finite numbers", verb="has")
+    return numbers

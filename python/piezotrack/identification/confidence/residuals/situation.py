@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...errors import PiezotrackError
-from ...stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
-from ...stages.plays.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskiiStage
+from ....errors import PiezotrackError
+from ....stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
+from ....stages.plays.rate_dependent_prandtl_ishlinskii import RateDependentPrandtlIshlinskiiStage
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
-    from ...data.dataset import Dataset
-    from ..fitted.identification import Identification
-    from ..fitted.start import History
+    from ....data.dataset import Dataset
+    from ...fitted.identification import Identification
+    from ...fitted.start import History
 
     Array = NDArray[np.float64]
     Mask = NDArray[np.bool_]

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..._support.arguments import expect
-from ..._support.display.result import Result
-from ..._support.statistics import sample_noise
-from ...data.checks.diagnostics import turns
-from ...errors import ParameterError
-from ..fitted.identification import Identification
+from ...._support.arguments import expect
+from ...._support.display.result import Result
+from ...._support.statistics import sample_noise
+from ....data.checks.diagnostics import amplitudes
+from ....errors import ParameterError
+from ...fitted.identification import Identification
 from .ingredients import explanations
 from .situation import Situation, autocorrelation, criterion, independent_samples
 
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...data.dataset import Dataset
+    from ....data.dataset import Dataset
     from .situation import Explained
 
     Array = NDArray[np.float64]
@@ -249,7 +248,7 @@ def residual_of(fit: Identification, record: int = 0) -> Residual:
     r = autocorrelation(judged, max(lags, judged.size // 4))
     n, k = judged.size, np.arange(1, lags + 1)
     portmanteau = float(n * (n + 2) * np.sum(r[1 : lags + 1] ** 2 / (n - k)))
-    rate, amplitude = np.gradient(data.u, data.dt), _amplitude(data.u)
+    rate, amplitude = np.gradient(data.u, data.dt), amplitudes(data.u)
     unit = data.drive_unit
     quantities = (
         ("time", "s", data.t),
@@ -345,15 +344,6 @@ def _threshold(lags: int) -> float:
     from scipy.special import chdtri
 
     return float(chdtri(lags, 1.0 - CONFIDENCE))
-
-
-def _amplitude(u: Array) -> Array:
-    """Half of the travel between the turning points around each sample."""
-    places = [0, *turns(u), u.size - 1]
-    amplitude = np.zeros(u.size)
-    for first, last in pairwise(places):
-        amplitude[first : last + 1] = np.ptp(u[first : last + 1]) / 2.0
-    return amplitude
 
 
 def _profile(quantity: str, unit: str, of: Array, values: Array) -> ResidualProfile:

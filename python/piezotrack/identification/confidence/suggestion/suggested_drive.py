@@ -8,19 +8,19 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ... import _core
-from ..._support.arguments import expect, number_pair, plain, positive
-from ..._support.arrays import check_dt
-from ..._support.display.result import Result
-from ..._support.files.writing import write_columns
-from ..._support.units import drive_word, of_drive, shown_unit
-from ...errors import ParameterError
-from ...stages.base import Stage
-from ..fitted.identification import Identification
-from ..fitted.identified_model import IdentifiedModel
-from .drive_blocks import Span
-from .drive_information import Truth
-from .drive_search import COUNTS, FEWEST, DriveSearch
+from .... import _core
+from ...._support.arguments import expect, number_pair, plain, positive
+from ...._support.arrays import check_dt
+from ...._support.display.result import Result
+from ...._support.files.writing import write_columns
+from ...._support.units import drive_word, of_drive, shown_unit
+from ....errors import ParameterError
+from ....stages.base import Stage
+from ...fitted.identification import Identification
+from ...fitted.identified_model import IdentifiedModel
+from .blocks import Span
+from .information import Truth
+from .search import COUNTS, FEWEST, DriveSearch
 
 if TYPE_CHECKING:
     import os

@@ -1,0 +1,1 @@
+"""Intervals of confidence from profiles and refits, about a fit."""

@@ -1,0 +1,1 @@
+"""The residual of a fit, and the ingredient that explains it."""

@@ -1,0 +1,1 @@
+"""The drive that determines the values of a model best."""

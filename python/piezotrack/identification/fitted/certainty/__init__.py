@@ -1,0 +1,1 @@
+"""How sure a result is: the covariance of its values, and bands of predictions."""

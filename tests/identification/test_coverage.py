@@ -1,0 +1,102 @@
+"""95 % intervals cover the truth in 95 of 100 records, whatever the model and the noise."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+
+BENCH = Path(__file__).parents[2] / "benches" / "coverage"
+# Goal of every cell, and the binomial error of 200 records, twice.
+LEAST, MOST, ERROR = 0.92, 0.98, 2.0 * np.sqrt(0.95 * 0.05 / 200)
+
+
+def loaded(name: str) -> Any:
+    """Return a module of the bench, which its others import by name."""
+    if name not in sys.modules:
+        spec = importlib.util.spec_from_file_location(name, BENCH / f"{name}.py")
+        assert spec is not None
+        assert spec.loader is not None
+        sys.modules[name] = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
+
+
+NOISES, TRUTHS, CELLS = (loaded(name) for name in ("noises", "truths", "cells"))
+REGULAR = [name for name, one in TRUTHS.CASES.items() if not (one.foreign or one.irregular)]
+
+
+def shares(case: str, noise: str, records: int) -> tuple[float, float]:
+    """Shares of all intervals that cover, and of those for independent noise."""
+    values = CELLS.measured(case, noise, records)["values"].values()
+    given = [value["given"] for value in values]
+    covered, independent = (
+        float(np.average([value[what] for value in values], weights=given))
+        for what in ("covered", "independent")
+    )
+    return covered, independent
+
+
+# Records of each, whose binomial error is allowed for three times.
+@pytest.mark.parametrize(
+    ("case", "noise", "records"),
+    [
+        ("plays", "white", 40),
+        ("plays", "AR 0.95", 40),
+        ("first-order Dahl", "AR 0.8", 15),
+        ("Maxwell slip", "white", 20),
+        ("generalised plays", "AR 0.8", 20),
+    ],
+)
+def test_intervals_cover(case: str, noise: str, records: int) -> None:
+    covered, independent = shares(case, noise, records)
+    assert covered > 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / records)
+    if noise != "white":
+        assert independent < 0.75
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [one for one in NOISES.NOISES if one != NOISES.RICHER])
+@pytest.mark.parametrize("case", REGULAR)
+def test_intervals_cover_over_200_records(case: str, noise: str) -> None:
+    covered, _ = shares(case, noise, 200)
+    assert LEAST - ERROR < covered < MOST + ERROR
+
+
+def test_deviations_of_what_follows_from_other_values_are_those_of_the_estimates() -> None:
+    # Thresholds of the drive stay, and the displacements at which elements slip follow.
+    values = CELLS.measured("Maxwell slip", "white", 30)["values"]
+    assert not any("slip" in name for name in values)
+    assert all(0.6 < value["ratio"] < 1.6 for value in values.values())
+
+
+def test_an_error_of_the_model_is_told_where_a_nested_drive_repeats() -> None:
+    case = TRUTHS.CASES["plays"]
+    u = case.drive(4)
+    noise = 20e-9 * np.random.default_rng(1).standard_normal(u.size)
+    x = TRUTHS.motion(TRUTHS.with_creep(case.stage), u, case.dt)
+    shares = case.fit(u, x + noise).covariance.shares
+    # The creep after the first part is not that before it.
+    assert 20e-9 < shares.noise < 40e-9
+    assert shares.model_error > 2.0 * shares.noise
+
+
+@pytest.mark.slow
+def test_the_exponent_is_that_of_the_least_cost() -> None:
+    case = TRUTHS.CASES["Bouc-Wen, exponent 2"]
+    u = case.drive()
+    noise = case.noise * np.random.default_rng(2).standard_normal(u.size)
+    fit = case.fit(u, TRUTHS.motion(case.stage, u, case.dt) + noise)
+    low, high = fit.covariance.interval("exponent", 0.999)
+    assert low < 2.0 < high
+    assert high - low < 0.2
+    held = {**case.options["parameters"], "exponent": 2.0}
+    log = pt.Dataset(u=u, y=fit.data.y, dt=case.dt)
+    true = pt.identify(log, "bouc-wen", history="virgin", parameters=held)
+    assert fit.cost < 1.0005 * true.cost
