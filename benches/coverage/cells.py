@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 from noises import RICHER, noise_of, seed_of
-from piezotrack.identification import residual_of
 from truths import CASES, motion, with_creep
+
+from piezotrack.identification import residual_of
 
 # Parts of a drive that repeats, which tells model error from noise.
 TIMES = 4

@@ -538,6 +538,7 @@ def linearised_covariance(
     list[float],
     list[list[float]],
     list[int],
+    list[list[float]],
 ]: ...
 def tied_values(
     model: str, values: Sequence[float], ties: Sequence[tuple[int, str]]

@@ -166,3 +166,20 @@ def test_wrong_levels_and_names_are_refused() -> None:
     with pytest.raises(ParameterError) as refused:
         certainty.deviation("mass")
     assert refused.value.argument == "name"
+
+
+def test_a_quantity_is_determined_where_its_single_values_are_not() -> None:
+    """Two cells of a Preisach plane move as one under any drive: their sum alone shows."""
+    log = pt.datasets.dbo_tracking()[3.0:33.0]
+    fit = pt.identify(log, "preisach", progress=False)
+    covariance = fit.covariance
+    assert covariance is not None
+    assert covariance.hidden.shape[0] >= 1
+    unknown = [name for name, known in zip(covariance.names, covariance.determined, strict=True)
+               if not known]  # fmt: skip
+    assert "linear" in unknown
+    assert covariance.interval("linear").upper == np.inf
+    (gain,) = (line for line in fit.summary().splitlines() if line.split()[:1] == ["gain"])
+    assert "+-" in gain
+    band = fit.prediction_band(log)
+    assert float(band.parameters.max()) < 0.01 * fit.stroke

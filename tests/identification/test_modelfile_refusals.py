@@ -134,6 +134,7 @@ COVARIANCE: dict[str, Any] = {
     "to_least_cost": [0.0, 0.0],
     "samples": 100,
     "orders": [2],
+    "hidden": [],
     "predicted": {"value": 1e-7, "unit": "m"},
 }
 

@@ -183,12 +183,13 @@ def covariance_of(
     precision = np.diag(_precision(model, values) * sizes**2).tolist()
     longest = max(record.samples for record in linear)
     short = longest <= MOST_RESAMPLED
-    rows, determined, independent, shifts, steps, resampled, orders = _core.linearised_covariance(
+    found = _core.linearised_covariance(
         [record.thinned(MOST) for record in linear], precision, DRAWS if short else 0, SEED
     )
+    rows, determined, independent, shifts, steps, resampled, orders, hidden = found
     if not short:
         few = [record.thinned(MOST_RESAMPLED) for record in linear]
-        *_, resampled, _ = _core.linearised_covariance(few, precision, DRAWS, SEED)
+        *_, resampled, _, _ = _core.linearised_covariance(few, precision, DRAWS, SEED)
     quantiles = np.quantile(np.array(resampled), LEVEL, axis=0)
     # Independent residuals have the variance of all that is left, not of the noise alone.
     powers = [sum(one.power_of(part) for one in linear) for part in ("noise", "residual")]
@@ -206,6 +207,7 @@ def covariance_of(
         to_least_cost=sizes * (np.array(steps) if aside else 0.0),
         samples=sum(record.samples for record in linear),
         orders=tuple(orders),
+        hidden=np.array(hidden).reshape(-1, sizes.size) * sizes,
         predicted=held_out(model, records, at).quantile(LEVEL),
         shares=linear[0].shares,
     )

@@ -169,11 +169,11 @@ def _of_record(model: IdentifiedModel, data: Dataset) -> _Motion:
 def _deviations(covariance: Covariance, columns: Array) -> Array:
     """Return standard deviations of a displacement for the covariance of the values (n,) [m].
 
-    What the records do not determine is known to within its own size.
+    In the directions that have no effect on the records a value is known to within its own size.
     """
-    unknown = np.where(covariance.determined, 0.0, covariance.values**2)
     spread = np.outer(covariance.widening, covariance.widening) * covariance.matrix
-    variance = np.sum(columns * ((spread + np.diag(unknown)) @ columns), axis=0)
+    variance = np.sum(columns * (spread @ columns), axis=0)
+    variance += np.sum((covariance.hidden @ columns) ** 2, axis=0)
     step = covariance.to_least_cost @ columns
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)) + np.abs(step))
 

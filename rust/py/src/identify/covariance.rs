@@ -20,9 +20,17 @@ type Record<'py> =
 
 /// Rows of the covariance; whether each value is determined, its variance for independent noise, what
 /// generalised least squares would change and the deviation of that, the step to the least squares;
-/// resampled deviations; orders.
-type Found =
-    (Vec<Vec<f64>>, Vec<bool>, Vec<f64>, Vec<(f64, f64)>, Vec<f64>, Vec<Vec<f64>>, Vec<usize>);
+/// resampled deviations; orders; changes without effect.
+type Found = (
+    Vec<Vec<f64>>,
+    Vec<bool>,
+    Vec<f64>,
+    Vec<(f64, f64)>,
+    Vec<f64>,
+    Vec<Vec<f64>>,
+    Vec<usize>,
+    Vec<Vec<f64>>,
+);
 
 /// How sure the values of a fit are, whose records are linearised about it.
 #[pyfunction]
@@ -56,6 +64,7 @@ fn linearised_covariance(
         found.steps,
         found.resampled,
         found.orders,
+        found.hidden,
     ))
 }
 

@@ -30,6 +30,8 @@ __all__ = [
 
 # Correlation from which on a pair of values is named.
 CORRELATED = 0.95
+# Share of its parts from which on a change without effect on the records moves a quantity.
+UNSEEN = 1e-3
 # Lists of a covariance with an entry for each value, as a model file has them.
 LISTS = (
     "values",
@@ -110,6 +112,8 @@ class Covariance:
         Samples of the records.
     orders : tuple of int
         Order of the autoregression of each record.
+    hidden : ndarray, shape (m, p)
+        Changes of the values without effect on the records, that of one value its own size [SI].
     predicted : float
         Half width in which 95 % of the errors are expected on a cycle like those of the records
         that was not fitted, as `PredictionBand` has it by amplitude and rate [m].
@@ -146,6 +150,7 @@ class Covariance:
     to_least_cost: Array
     samples: int
     orders: tuple[int, ...]
+    hidden: Array
     predicted: float
     shares: NoiseShares | None = None
 
@@ -252,7 +257,9 @@ class Covariance:
         """
         normal = normal_reach(level)
         variances = (gradient**2) * np.diag(self.matrix)
-        if not self.determined[variances > 0.0].all():
+        if np.any(
+            np.abs(self.hidden @ gradient) > UNSEEN * (np.abs(self.hidden) @ np.abs(gradient))
+        ):
             return math.inf
         whole = float(variances.sum())
         widening = float(variances @ self.widening) / whole if whole > 0.0 else 1.0
@@ -310,6 +317,7 @@ def covariance_entry(covariance: Covariance | None) -> dict[str, Any]:
         **{name: getattr(covariance, name).tolist() for name in LISTS},
         "samples": covariance.samples,
         "orders": list(covariance.orders),
+        "hidden": covariance.hidden.tolist(),
         "predicted": {"value": covariance.predicted, "unit": "m"},
     }
     if covariance.shares is not None:
@@ -363,6 +371,7 @@ def covariance_of_file(entry: Any) -> Covariance | None:
         **{**lists, "determined": lists["determined"] != 0.0},
         samples=_core.as_count("covariance: samples", found["samples"]),
         orders=tuple(_core.as_count("covariance: orders", order) for order in found["orders"]),
+        hidden=_numbers("hidden", found["hidden"]).reshape(-1, len(names)),
         predicted=_core.as_number("covariance: predicted", found["predicted"]["value"]),
         shares=NoiseShares(**shares) if shares else None,
     )

@@ -64,6 +64,7 @@ def report_page(
         sections.overview(fit),
         sections.records(fit),
         sections.motion(fit),
+        sections.residual(fit),
         sections.parameters(fit),
         sections.verdicts(fit),
         sections.search(fit),

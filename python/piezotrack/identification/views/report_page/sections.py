@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from ...._support.display.table import words
 from ...._support.page.parts import Listing, Picture, Section, Sentences
 from ...._support.units import length_text, of_drive, shown_unit
-from ..confidence.residual_report import fit_notes
+from ...confidence.residuals.residual import residual_of
+from ..confidence.residual_report import fit_notes, verdict
 from ..html import records_table
 from ..plot import band_of, plot_loop, plot_time, what_was_fitted
 from ..quantities import errors_of, of_sensor, of_stage, predicted
@@ -35,6 +36,7 @@ __all__ = [
     "overview",
     "parameters",
     "records",
+    "residual",
     "search",
     "suggestion",
     "verdicts",
@@ -141,6 +143,26 @@ def _both(fit: Identification, record: FittedRecord, figure: Figure | SubFigure)
     plot_time(data, run, (above, below), stroke=record.stroke, half=band_of(fit, data))
     below.set_title(below.get_title().removeprefix("error = measured - simulated: "), fontsize=8)
     figure.suptitle(what_was_fitted(fit, record), fontsize="medium")
+
+
+def residual(fit: Identification) -> Section:
+    """Draw the residual of the record that fits worst, and write its cause."""
+    worst = max(
+        (i for i, one in enumerate(fit.records) if one.data is not None),
+        key=lambda i: fit.records[i].cost_percent,
+    )
+    judged = residual_of(fit, worst)
+
+    def draw(figure: Figure | SubFigure) -> None:
+        judged.plot(fig=figure)
+        # The cause is in the text.
+        figure.suptitle("")
+        for axes in figure.axes:
+            axes.set_title(axes.get_title().partition(":")[0], fontsize=8)
+
+    which = f" of record {worst + 1}" if len(fit.records) > 1 else ""
+    picture = Picture("residual", draw, 4.8, f"residual{which}: where it is large")
+    return Section("Residual", (Sentences((f"Cause: {verdict(judged)}.",)), picture))
 
 
 def parameters(fit: Identification) -> Section:

@@ -31,6 +31,8 @@ pub struct Covariance {
     pub matrix: Vec<Vec<f64>>,
     /// Whether the records determine each value.
     pub determined: Vec<bool>,
+    /// Changes of the values without effect on the records, the largest of each 1.
+    pub hidden: Vec<Vec<f64>>,
     /// Variance of each for independent noise.
     pub independent: Vec<f64>,
     /// Change of each value by generalised least squares, and the standard deviation of that.
@@ -96,6 +98,7 @@ pub fn covariance(
         independent: (0..count).map(|i| noise * b[(i, i)]).collect(),
         matrix: matrix.row_iter().map(|row| row.iter().copied().collect()).collect(),
         determined: inverse.determined,
+        hidden: inverse.hidden,
         shifts,
         steps: (b * slope).iter().copied().collect(),
         resampled,
@@ -134,6 +137,7 @@ fn squares(values: &[f64]) -> f64 {
 struct Inverse {
     matrix: DMatrix<f64>,
     determined: Vec<bool>,
+    hidden: Vec<Vec<f64>>,
 }
 
 impl Inverse {
@@ -159,7 +163,13 @@ impl Inverse {
             1.0 - length > WITHOUT
         };
         let determined = (0..count).map(|i| sizes[i] > 0.0 && !hidden(i)).collect();
-        Self { matrix, determined }
+        let direction = |k: usize| {
+            let change = |i: usize| axes[(i, k)] / if sizes[i] > 0.0 { sizes[i] } else { 1.0 };
+            let largest = (0..count).map(|i| change(i).abs()).fold(f64::MIN_POSITIVE, f64::max);
+            (0..count).map(|i| change(i) / largest).collect()
+        };
+        let unseen = (0..count).filter(|k| !seen.contains(k));
+        Self { matrix, determined, hidden: unseen.map(direction).collect() }
     }
 }
 
