@@ -64,6 +64,7 @@ __all__ = [
     "tied_values",
     "tracking_metrics",
     "tune",
+    "tuning_costs",
     "turns",
     "voltages_before",
 ]
@@ -472,7 +473,16 @@ def tune(
     margins: tuple[float, float, float, float],
     axes: Sequence[SoughtController],
     tasks: Sequence[Task | PathTask],
+    starts: Sequence[Sequence[float]],
 ) -> dict[str, Any]: ...
+def tuning_costs(
+    problem: _TuningProblem,
+    *,
+    margins: tuple[float, float, float, float],
+    axes: Sequence[SoughtController],
+    tasks: Sequence[Task | PathTask],
+    places: Sequence[Sequence[float]],
+) -> list[tuple[float, float]]: ...
 
 _Motion = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 _Spread = tuple[float, float, float, float, float]

@@ -111,6 +111,64 @@ def test_the_fastest_of_the_allowed_sampling_rates_wins_on_a_clean_stage() -> No
     assert tuned.controller.dt == 0.005
 
 
+def of_plays(frequency: float, damping_ratio: float, noise: float) -> pt.VirtualStage:
+    stage = pt.PrandtlIshlinskiiStage(
+        linear=0.8e-6,
+        thresholds=(2.0, 8.0, 20.0),
+        weights=(2e-7, 1.5e-7, 1e-7),
+        frequency=frequency,
+        damping_ratio=damping_ratio,
+    )
+    return pt.VirtualStage.of(stage, noise=noise, seed=3)
+
+
+def test_searches_with_any_seed_end_at_the_same_error() -> None:
+    """Each has minima that a single swarm ends in: 1.9 times the least error, and 1.3 times."""
+    slow = pt.triangle(frequency=1.0, low=10e-6, high=50e-6, duration=3.0)
+    fast = pt.triangle(frequency=5.0, low=10e-6, high=50e-6, duration=1.0)
+    rough = pt.PrandtlIshlinskiiStage(
+        linear=0.85e-6,
+        thresholds=(3.0, 12.0),
+        weights=(2.4e-7, 1.2e-7),
+        frequency=220.5,
+        damping_ratio=0.05,
+    )
+    stages = (of_plays(30.0, 1.5, 30e-9), of_plays(210.0, 0.05, 5e-9))
+    lag = {"dt": 5e-3, "timing": pt.Timing(delay=2e-3)}
+    mode = {"dt": 1e-3, "timing": pt.Timing(delay=0.3e-3), "feedforward": rough.inverse()}
+    cases = zip(stages, (slow, fast), (lag, mode), strict=True)
+    for stage, line, options in cases:
+        known: dict[str, Any] = {"limits": LIMITS, "parts": ("pid", "low-pass"), **options}
+        tuned = [
+            pt.tune(stage, line, search=pt.TuningSearch(seed=seed), **known) for seed in range(1, 6)
+        ]
+        errors = [one.value for one in tuned]
+        assert max(errors) < 1.03 * min(errors)
+        assert all(1 <= one.agreeing <= one.searches for one in tuned)
+        assert max(one.agreeing for one in tuned) > 1
+
+
+@pytest.mark.parametrize(
+    ("more", "less"),
+    [
+        ({"parts": ("pid", "low-pass", "notch")}, {"parts": ("pid", "low-pass")}),
+        ({"law": "disturbance-observer"}, {"law": "pid"}),
+        ({"law": "perturbation-estimator"}, {"law": "sliding-mode"}),
+    ],
+)
+def test_a_law_is_not_worse_than_the_one_inside_of_it(
+    more: dict[str, Any], less: dict[str, Any]
+) -> None:
+    stage = of_plays(160.0, 0.1, 10e-9)
+    line = pt.triangle(frequency=2.0, low=10e-6, high=50e-6, duration=1.5)
+    known: dict[str, Any] = {"dt": 2e-3, "limits": LIMITS, "timing": pt.Timing(delay=0.5e-3)}
+    errors = [
+        pt.tune(stage, line, **{**known, "parts": ("pid", "low-pass"), **options}).value
+        for options in (more, less)
+    ]
+    assert errors[0] < 1.01 * errors[1]
+
+
 def test_the_same_bits_for_any_number_of_threads() -> None:
     stage, reference = published_stage(), motion(7.5)
     tuned = [

@@ -220,6 +220,7 @@ fn the_integral_gain_from_margins_alone_is_the_known_one() {
         particles: 20,
         iterations: 100,
         seed: 1,
+        starts: Vec::new(),
     };
     let found = tuning.search(NEVER).unwrap();
     let integral = found.settings[0][1].1 * 1e-6;
@@ -259,6 +260,7 @@ fn a_search_beats_the_published_gains_and_keeps_its_margins() {
         particles: 24,
         iterations: 40,
         seed: 1,
+        starts: Vec::new(),
     };
     let found = tuning.search(NEVER).unwrap();
     assert!(found.excess <= 1.0);

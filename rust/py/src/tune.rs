@@ -23,7 +23,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyPathTask>()?;
     module.add_class::<PySoughtController>()?;
     module.add_function(wrap_pyfunction!(check_margins, module)?)?;
-    module.add_function(wrap_pyfunction!(tune, module)?)
+    module.add_function(wrap_pyfunction!(tune, module)?)?;
+    module.add_function(wrap_pyfunction!(tuning_costs, module)?)
 }
 
 /// Checks margins that a loop is to keep.
@@ -212,6 +213,8 @@ struct FoundSettings {
     candidates: usize,
     loops: usize,
     history: Vec<f64>,
+    searches: usize,
+    agreeing: usize,
 }
 
 impl FoundSettings {
@@ -227,6 +230,8 @@ impl FoundSettings {
             candidates: found.candidates,
             loops: found.loops,
             history: found.history.clone(),
+            searches: found.searches,
+            agreeing: found.agreeing,
         }
     }
 }
@@ -274,6 +279,29 @@ struct Problem {
     goal: Goal,
     search: Search,
     threads: usize,
+}
+
+impl Problem {
+    /// The search of it.
+    fn tuning<'a>(
+        &self,
+        margins: MarginNumbers,
+        axes: &[PyRef<'_, PySoughtController>],
+        tasks: Vec<Judge<'a>>,
+    ) -> Tuning<'a> {
+        let Self { goal, search, .. } = self;
+        Tuning {
+            axes: axes.iter().map(|axis| axis.0.clone()).collect(),
+            required: goal.required(margins),
+            aim: goal.aim(tasks.len()),
+            tasks,
+            effort: goal.effort,
+            particles: search.particles,
+            iterations: search.iterations,
+            seed: search.seed,
+            starts: Vec::new(),
+        }
+    }
 }
 
 impl Goal {
@@ -341,7 +369,7 @@ impl PySoughtController {
 /// Searches the settings of a controller, or of those of both axes, with margins that may have some
 /// in reserve.
 #[pyfunction]
-#[pyo3(signature = (problem, *, margins, axes, tasks))]
+#[pyo3(signature = (problem, *, margins, axes, tasks, starts))]
 #[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
 fn tune(
     py: Python<'_>,
@@ -349,19 +377,29 @@ fn tune(
     margins: MarginNumbers,
     axes: Vec<PyRef<'_, PySoughtController>>,
     tasks: Vec<AnyTask<'_>>,
+    starts: Vec<Vec<f64>>,
 ) -> PyResult<FoundSettings> {
-    let Problem { goal, search, threads } = problem;
     let judges: Result<Vec<Judge<'_>>> = tasks.iter().map(AnyTask::judge).collect();
-    let tuning = Tuning {
-        axes: axes.iter().map(|axis| axis.0.clone()).collect(),
-        tasks: judges.map_err(|error| raise(&error))?,
-        required: goal.required(margins),
-        aim: goal.aim(tasks.len()),
-        effort: goal.effort,
-        particles: search.particles,
-        iterations: search.iterations,
-        seed: search.seed,
-    };
-    let found = enter_quiet_pool(py, threads, |stop| tuning.search(stop))?;
+    let judges = judges.map_err(|error| raise(&error))?;
+    let tuning = Tuning { starts, ..problem.tuning(margins, &axes, judges) };
+    let found = enter_quiet_pool(py, problem.threads, |stop| tuning.search(stop))?;
     Ok(FoundSettings::of(&found))
+}
+
+/// Excess and cost of places of the unit box, as the search ranks them; for benches.
+#[pyfunction]
+#[pyo3(signature = (problem, *, margins, axes, tasks, places))]
+#[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
+fn tuning_costs(
+    py: Python<'_>,
+    problem: Problem,
+    margins: MarginNumbers,
+    axes: Vec<PyRef<'_, PySoughtController>>,
+    tasks: Vec<AnyTask<'_>>,
+    places: Vec<Vec<f64>>,
+) -> PyResult<Vec<(f64, f64)>> {
+    let judges: Result<Vec<Judge<'_>>> = tasks.iter().map(AnyTask::judge).collect();
+    let judges = judges.map_err(|error| raise(&error))?;
+    let tuning = problem.tuning(margins, &axes, judges);
+    enter_quiet_pool(py, problem.threads, |stop| tuning.costs(&places, stop))
 }

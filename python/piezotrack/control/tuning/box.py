@@ -173,5 +173,5 @@ def _notch(plants: Sequence[_core.LoopPlant], dt: float) -> list[tuple[str, floa
     return [
         ("notch_frequency", low, high, True),
         ("notch_width", 0.02, 2.0, True),
-        ("notch_depth", 0.0, 0.9, False),
+        ("notch_depth", 0.0, 1.0, False),
     ]

@@ -86,16 +86,17 @@ class TuningSearch:
     Parameters
     ----------
     particles, iterations : int, optional
-        Of the swarm; it searches twice, the second time about the best place.
+        Candidates that each of the four to six searches begins with, 4 or more, and by how many
+        times as many it goes on. A refinement about its best takes as many again at most.
     seed : int, optional
-        Seed of the swarm.
+        Seed of the searches.
     draws : int, optional
         Draws of the sensor's noise over which each reference is followed, 1 to 100.
 
     Raises
     ------
     ParameterError
-        A value is no whole number, or there are too many draws. A swarm that is too small is
+        A value is no whole number, or there are too many draws. A search that is too small is
         refused by `tune`.
 
     Examples

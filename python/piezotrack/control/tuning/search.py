@@ -12,8 +12,10 @@ from ...references.xy_reference import XYReference
 from ..controller.controller import Controller
 from ..loop.tracking import can_be_learnt
 from .box import Box, box_of, resonance
+from .goal import Goal
 from .margins import NamedPlant, plants_of
 from .motions import tasks_of
+from .starts import place_of, simc
 from .tuned import MarginReport
 
 if TYPE_CHECKING:
@@ -27,6 +29,8 @@ __all__ = ["Solution", "search_at"]
 SLACK = 0.003
 # Searches with more and more in reserve.
 ROUNDS = 4
+# Budget of the search for gains from margins alone that a search along references begins with.
+ALONE = {"particles": 24, "iterations": 12}
 
 
 class AxisSearch(NamedTuple):
@@ -112,14 +116,21 @@ def search_at(problem: TuningProblem, dt: float) -> Solution:
     axes = [_axis_search(problem, axis, dt) for axis in problem.axes]
     repeats = any(axis.box.period is not None for axis in axes)
     tasks = tasks_of(problem, [axis.base for axis in axes], repeats)
+    cores = [axis._core for axis in axes]
+    starts = _starts(problem, axes, cores) if tasks else []
     reserve = 1.0
+    solution: Solution | None = None
     for _ in range(ROUNDS):
         outcome = _core.tune(
             problem,
             margins=_with_reserve(problem.margins, reserve),
-            axes=[axis._core for axis in axes],
+            axes=cores,
             tasks=tasks,
+            starts=starts,
         )
+        if outcome["excess"] > 1.0 and solution is not None:
+            # Nothing keeps what is in reserve.
+            return solution
         solution = Solution(outcome, axes, [])
         if outcome["excess"] > 1.0:
             return solution
@@ -127,7 +138,32 @@ def search_at(problem: TuningProblem, dt: float) -> Solution:
         if solution.feasible:
             return solution
         reserve *= 1.0 + 1.2 * (solution.excess - 1.0)
+    assert solution is not None
     return solution
+
+
+def _starts(
+    problem: TuningProblem, axes: list[AxisSearch], cores: list[_core.SoughtController]
+) -> list[list[float]]:
+    """Gains of the tuning rule, and those from margins alone."""
+    ranges = [one for axis in axes for one in axis.box.ranges]
+    if not any(name == "ki" for name, *_ in ranges):
+        return []
+    rules = [simc([one.plant for one in axis.plants], axis.base.dt) for axis in axes]
+    starts = [
+        [at for axis, one in zip(axes, gains, strict=True) for at in place_of(one, axis.box.ranges)]
+        for gains in zip(*rules, strict=True)
+    ]
+    alone = replace(problem, goal=Goal(), search=replace(problem.search, **ALONE))
+    outcome = _core.tune(
+        alone,
+        margins=_with_reserve(problem.margins, 1.0),
+        axes=cores,
+        tasks=[],
+        starts=starts,
+    )
+    pairs = zip(axes, outcome["settings"], strict=True)
+    return [*starts, [at for axis, one in pairs for at in place_of(dict(one), axis.box.ranges)]]
 
 
 def _axis_search(problem: TuningProblem, axis: Axis, dt: float) -> AxisSearch:

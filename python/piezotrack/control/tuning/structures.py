@@ -71,7 +71,8 @@ def law_ranges(
         "lead_time": ("lead_time", 0.1 * dt, 1e6 * dt, True),
         "lag_time": ("lag_time", 0.1 * dt, 1e6 * dt, True),
         "switching": ("switching", 1e-3 * span, 0.3 * span, True),
-        "observer": ("observer", 1e-3 / dt, 0.45 / dt, True),
+        # At the lower end it is not there.
+        "observer": ("observer", 1e-7 / dt, 0.45 / dt, True),
     }
     return [ranges[name] for name in SOUGHT[law]]
 

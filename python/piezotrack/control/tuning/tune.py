@@ -75,8 +75,12 @@ def tune(
 ) -> Tuned:
     """Find the gains of a controller, its filters and its repetitive part.
 
-    A swarm evaluates controllers in closed loop with the stage, with its noise, quantisation,
-    delay, jitter, saturation and creep, and makes the error along the references small. Every
+    Searches from several sides evaluate controllers in closed loop with the stage, with its noise,
+    quantisation, delay, jitter, saturation and creep, and make the error along the references
+    small. There are four of them, and two more where none ends within 2 % of the best; one begins
+    with Skogestad's rule (2003, doi 10.1016/S0959-1524(02)00062-8) and with the gains from margins
+    alone. Each is by differential evolution (Tanabe and Fukunaga 2014, doi
+    10.1109/CEC.2014.6900380), refined by CMA-ES (Hansen 2016, arXiv 1604.00772). Every
     controller keeps the margins for every plant of a set: each stage given at its lowest, middle
     and highest gain, with every end of the spread. What it keeps is checked exactly in the end.
     Without a reference the gains follow from the margins alone: the largest integral gain that
@@ -125,7 +129,7 @@ def tune(
     timing : Timing, optional
         Delay and jitter of the loop, and the voltages before a run.
     search : TuningSearch, optional
-        Budget and seed of the swarm, and draws of the noise.
+        Budget and seed of the searches, and draws of the noise.
     threads : int, optional
         Threads, 0 for all cores. The result has the same bits for any number of them.
 
@@ -196,6 +200,8 @@ def _simulated(problem: TuningProblem, best: Solution, solutions: list[Solution]
         candidates=sum(one.outcome["candidates"] for one in solutions),
         loops=sum(one.outcome["loops"] for one in solutions),
         history=tuple(best.outcome["history"]),
+        searches=best.outcome["searches"],
+        agreeing=best.outcome["agreeing"],
     )
 
 

@@ -91,6 +91,8 @@ class Tuned(Result):
         Controllers evaluated, and closed loops simulated.
     history : tuple of float
         Best figure after each iteration; infinite as long as no candidate kept the margins.
+    searches, agreeing : int
+        Searches from different sides, and how many of them end within 2 % of the best.
     """
 
     views: ClassVar[Mapping[str, str]] = {
@@ -109,6 +111,8 @@ class Tuned(Result):
     candidates: int
     loops: int
     history: tuple[float, ...]
+    searches: int
+    agreeing: int
     unit: str = "m"
 
     @property
@@ -160,6 +164,8 @@ class Tuned(Result):
             "binding": list(self.active_constraints),
             "controllers": self.candidates,
             "loops": self.loops,
+            "searches": self.searches,
+            "agreeing": self.agreeing,
             "provenance": {"package": "piezotrack", "version": _core.__version__},
         }
 

@@ -41,7 +41,8 @@ def tuned_text(tuned: Tuned) -> str:
     lines = [
         *gains,
         f"{tuned.minimised}, at {rate:.6g} Hz: {tuned.candidates} controllers evaluated, "
-        f"{tuned.loops} loops simulated",
+        f"{tuned.loops} loops simulated; {tuned.agreeing} of {tuned.searches} searches end within "
+        "2 % of the best",
     ]
     if tuned.runs:
         scale, unit = _shown(tuned)

@@ -97,7 +97,7 @@ impl Draws {
     }
 
     /// Normal deviates.
-    fn normals(&mut self, count: usize) -> Vec<f64> {
+    pub(crate) fn normals(&mut self, count: usize) -> Vec<f64> {
         let mut normals = Vec::with_capacity(count + 1);
         while normals.len() < count {
             normals.extend(self.two_normals());

@@ -1,7 +1,9 @@
 //! Gains that nobody picks by hand: closed loops of many controllers in lanes, what a loop has to
 //! keep for every model of a set, and the search.
 
+mod adaptation;
 mod contour;
+mod evolution;
 mod judge;
 mod loops;
 mod parts;

@@ -10,7 +10,7 @@ use piezotrack_control::{Controller, SampledRepetitive};
 
 use crate::design::{LinearFeedback, LoopPlant, in_series};
 use crate::error::{Error, Result, positive};
-use crate::math::{C, Jet, Ratio};
+use crate::math::{C, Ratio};
 use crate::parts::Law;
 
 /// Requirements that every loop of a set keeps.
@@ -228,10 +228,10 @@ impl PlantSet {
             let mut one = walk(law.len(), integrators, |k| forward(k) * law[k]);
             if let Some(learnt) = &learnt {
                 let gain = (0..law.len()).map(|k| {
-                    let closed = forward(k) / (C::new(1.0, 0.0) + forward(k) * law[k]);
-                    (learnt[k].0 * (C::new(1.0, 0.0) - learnt[k].1 * closed)).norm()
+                    let closed = over(forward(k), C::new(1.0, 0.0) + forward(k) * law[k]);
+                    (learnt[k].0 * (C::new(1.0, 0.0) - learnt[k].1 * closed)).norm_sqr()
                 });
-                one.learning.value = gain.fold(0.0, f64::max);
+                one.learning.value = libm::sqrt(gain.fold(0.0, f64::max));
             }
             let one = one.numbered_from(plant);
             out = Some(out.map_or(one, |before| before.worse(one)));
@@ -256,8 +256,8 @@ impl PlantSet {
                 power *= late;
             }
             // The whole delay turns it, and changes no size.
-            let lead = late.inv().powu(to_u32(recursion.lead.min(recursion.nearest)));
-            (sum / (one - late * recursion.pole), lead * recursion.gain)
+            let lead = late.conj().powu(to_u32(recursion.lead.min(recursion.nearest)));
+            (over(sum, one - late * recursion.pole), lead * recursion.gain)
         });
         places.collect()
     }
@@ -272,18 +272,35 @@ fn integrators(law: &Ratio) -> usize {
 /// The loop along the grid: margins, and roots outside.
 fn walk(count: usize, integrators: usize, open: impl Fn(usize) -> C) -> Robustness {
     let one = C::new(1.0, 0.0);
+    // Square of the distance from -1.
     let mut nearest = f64::INFINITY;
     let (mut phase, mut gain) = (PI, f64::INFINITY);
-    let mut turned = 0.0;
+    // Turns of 1 + L across the negative real axis, counterclockwise.
+    let mut turns = 0.0;
     let mut before: Option<(C, C)> = None;
     let mut first = 0.0;
     for k in 0..count {
         let open = open(k);
         let closed = one + open;
-        let distance = before.map_or(closed.norm(), |(_, last)| from_zero(last, closed));
+        let distance = closed.norm_sqr();
         nearest = if distance >= nearest { nearest } else { distance };
         if let Some((last, last_closed)) = before {
-            turned += (closed * last_closed.conj()).arg();
+            let way = closed - last_closed;
+            // On the line between them there is a place nearer to 0 than either.
+            if dot(last_closed, way) < 0.0 && dot(closed, way) > 0.0 {
+                nearest = nearest.min(
+                    square(last_closed.re * way.im - last_closed.im * way.re) / way.norm_sqr(),
+                );
+            }
+            let down = closed.im.is_sign_negative();
+            if down != last_closed.im.is_sign_negative() {
+                let cross = last_closed.re * closed.im - last_closed.im * closed.re;
+                if down && cross > 0.0 {
+                    turns += 1.0;
+                } else if !down && cross < 0.0 {
+                    turns -= 1.0;
+                }
+            }
             if (last.norm_sqr() > 1.0) != (open.norm_sqr() > 1.0) {
                 let at = between(last, open, last.norm().ln(), open.norm().ln());
                 phase = phase.min((-at).arg().abs());
@@ -309,6 +326,8 @@ fn walk(count: usize, integrators: usize, open: impl Fn(usize) -> C) -> Robustne
     }
     // Along the upper half of the circle 1 + L turns from where it begins to 0 where no root is
     // outside; each integrator lets it begin 90 degrees earlier.
+    let last = before.map_or(first, |(_, closed)| closed.arg());
+    let turned = last - first + 2.0 * PI * turns;
     let begin = if integrators > 1 && first > 0.0 { first - 2.0 * PI } else { first };
     let lost = (begin + turned) / PI;
     let reversed = integrators < 2 && first.abs() > 0.75 * PI;
@@ -318,17 +337,18 @@ fn walk(count: usize, integrators: usize, open: impl Fn(usize) -> C) -> Robustne
         unstable: worst(outside),
         gain_margin: worst(gain),
         phase_margin: worst(phase),
-        sensitivity: worst(if nearest > 0.0 { 1.0 / nearest } else { f64::INFINITY }),
+        sensitivity: worst(if nearest > 0.0 { 1.0 / libm::sqrt(nearest) } else { f64::INFINITY }),
         learning: worst(0.0),
     }
 }
 
-/// Distance of the line between two values from 0.
-fn from_zero(a: C, b: C) -> f64 {
-    let way = b - a;
-    let share = -(a.re * way.re + a.im * way.im) / way.norm_sqr();
-    let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 };
-    (a + way * share).norm()
+fn square(value: f64) -> f64 {
+    value * value
+}
+
+/// Scalar product of two values as vectors.
+fn dot(a: C, b: C) -> f64 {
+    a.re * b.re + a.im * b.im
 }
 
 /// Where the line between two values crosses zero of a quantity that is `low` at one, `high` at
@@ -381,8 +401,15 @@ fn unit(angle: f64) -> C {
 }
 
 fn of(ratio: &Ratio, delta: C) -> C {
-    let (above, below) = ratio.at(Jet { value: delta, slope: C::new(0.0, 0.0) });
-    above.value / below.value
+    let at = |polynomial: &[f64]| {
+        polynomial.iter().rev().fold(C::new(0.0, 0.0), |sum, of| sum * delta + of)
+    };
+    over(at(&ratio.above), at(&ratio.below))
+}
+
+/// The ratio of two values, neither so large that its square overflows.
+fn over(above: C, below: C) -> C {
+    above * below.conj() * below.norm_sqr().recip()
 }
 
 fn small(count: usize) -> f64 {

@@ -1,19 +1,20 @@
 //! The search for the settings of a controller.
 //!
-//! A swarm (Standard Particle Swarm Optimisation 2011) looks for the settings with the least figure
-//! over all tasks among those that keep what is required; where none does, for those nearest to it.
-//! Then it looks again, about the best place, in a smaller box. Loops are only simulated for
-//! controllers that keep the margins.
+//! Several searches, each from another side, look for the settings with the least figure over all
+//! tasks among those that keep what is required; where none does, for those nearest to it. Where
+//! none agrees with the best, there are more of them. Loops are only simulated for controllers that
+//! keep the margins.
 
 use piezotrack_control::Controller;
 use rayon::prelude::*;
 
+use super::adaptation::Adaptation;
+use super::evolution::Evolution;
 use super::judge::{Judge, Ready};
 use super::requirements::{PlantSet, Requirements, Robustness};
 use super::run_metrics::RunMetrics;
 use super::settings::{Setting, Sought, Template};
 use crate::error::{Error, Result, not_negative};
-use crate::identify::{Swarm, SwarmSettings};
 use crate::parts::Law;
 use crate::signal::{Stop, index};
 
@@ -56,12 +57,15 @@ pub struct Tuning<'a> {
     pub aim: Aim,
     /// Error that a volt (rms) of change from sample to sample is worth, m/V.
     pub effort: f64,
-    /// Particles of the swarm.
+    /// Candidates that each search begins with.
     pub particles: usize,
-    /// Iterations of either look.
+    /// Each search evolves for as many candidates as this times those it begins with, and is refined
+    /// for as many again at most.
     pub iterations: usize,
-    /// Seed of the swarm.
+    /// Seed of the searches.
     pub seed: u64,
+    /// Places of the unit box that one search begins with besides random ones.
+    pub starts: Vec<Vec<f64>>,
 }
 
 /// Settings with their values.
@@ -89,6 +93,10 @@ pub struct Found {
     pub loops: usize,
     /// Best figure after each iteration; infinite as long as none keeps what is required.
     pub history: Vec<f64>,
+    /// Searches from different sides.
+    pub searches: usize,
+    /// How many of them end within 2 % of the best.
+    pub agreeing: usize,
 }
 
 /// A candidate and what was found of it.
@@ -106,19 +114,134 @@ impl Tried {
     /// Rank that the swarm makes small: any that keeps what is required comes before any that does
     /// not, and one that keeps the margins before one that does not.
     fn rank(&self) -> f64 {
-        match (self.excess <= 1.0, self.figures.is_empty()) {
+        let rank = match (self.excess <= 1.0, self.figures.is_empty()) {
             (true, _) => self.cost,
             (false, false) => 1e6 * self.excess,
             (false, true) => 1e12 * self.excess,
+        };
+        if rank.is_nan() { f64::INFINITY } else { rank }
+    }
+}
+
+/// Where a search begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    /// With a low-pass slower than the loop, which with the derivative is another structure.
+    Slow,
+    /// With a faster low-pass and a feedback that does most of the work.
+    Fast,
+    /// As [`Side::Fast`], at the places given, and without the observer about a law.
+    Inside,
+}
+
+/// Sides of the searches, and their budgets as multiples of that of the first; those of the second
+/// round are taken where none of the first agree.
+const ROUNDS: [(&[Side], usize); 2] =
+    [(&[Side::Slow, Side::Fast, Side::Inside, Side::Slow], 1), (&[Side::Fast, Side::Slow], 2)];
+
+/// Searches that end within this share of the best one agree with it.
+const AGREE: f64 = 0.02;
+
+/// Fewest candidates that a search begins with: a trial is made of four.
+const LEAST_PARTICLES: usize = 4;
+
+/// Most candidates of a search.
+const MOST_CANDIDATES: usize = 1_000_000_000;
+
+/// A refinement that after so many candidates is so much worse than the best search ends.
+const BEHIND: (usize, f64) = (800, 1.5);
+
+/// First step of a refinement, as a share of the box.
+const ABOUT: f64 = 0.1;
+
+impl Side {
+    /// Part of the range in which a setting begins.
+    fn part(self, setting: Setting) -> (f64, f64) {
+        match (self, setting) {
+            (Self::Slow, Setting::Cutoff) | (Self::Fast | Self::Inside, Setting::Learning) => {
+                (0.0, 0.3)
+            }
+            (Self::Fast, Setting::Cutoff) => (0.3, 1.0),
+            (Self::Fast | Self::Inside, Setting::Integral) => (0.5, 1.0),
+            // It does not evolve from there; its refinement has it.
+            (Self::Inside, Setting::Observer) => (0.0, 0.0),
+            _ => (0.0, 1.0),
         }
     }
 }
 
-/// Half the width of the box of the second look, as a share of the first.
-const NEARER: f64 = 0.08;
+/// What a search does at present.
+enum Phase {
+    Evolving(Evolution),
+    Refining(Adaptation),
+    Ended,
+}
 
-/// Iterations without a gain after which a look ends.
-const STALLED: usize = 40;
+/// One search.
+struct Run {
+    address: (u64, u64),
+    phase: Phase,
+    refined: usize,
+    best: Option<(Vec<f64>, Tried)>,
+}
+
+impl Run {
+    fn asked(&self) -> Vec<Vec<f64>> {
+        match &self.phase {
+            Phase::Evolving(one) => one.asked().cloned().collect(),
+            Phase::Refining(one) => one.asked().cloned().collect(),
+            Phase::Ended => Vec::new(),
+        }
+    }
+
+    fn tell(&mut self, places: &[Vec<f64>], tried: &[Tried]) {
+        let ranks: Vec<f64> = tried.iter().map(Tried::rank).collect();
+        for (place, one) in places.iter().zip(tried) {
+            if self.best.as_ref().is_none_or(|(_, best)| one.rank() < best.rank()) {
+                self.best = Some((place.clone(), one.clone()));
+            }
+        }
+        match &mut self.phase {
+            Phase::Evolving(one) => one.tell(&ranks),
+            Phase::Refining(one) => one.tell(&ranks),
+            Phase::Ended => {}
+        }
+        let ended = match &self.phase {
+            Phase::Evolving(one) => one.ended(),
+            Phase::Refining(one) => one.ended(),
+            Phase::Ended => false,
+        };
+        if ended {
+            self.phase = match (&self.phase, &self.best) {
+                (Phase::Evolving(_), Some((place, _))) => {
+                    Phase::Refining(Adaptation::new(self.address, place, ABOUT, self.refined))
+                }
+                _ => Phase::Ended,
+            };
+        }
+    }
+
+    /// Ends where it is far behind the best of all searches.
+    fn give_up(&mut self, best: f64) {
+        let (candidates, factor) = BEHIND;
+        if let Phase::Refining(one) = &self.phase
+            && one.evaluated() >= candidates
+            && self.rank() > factor * best
+        {
+            self.phase = Phase::Ended;
+        }
+    }
+
+    fn rank(&self) -> f64 {
+        self.best.as_ref().map_or(f64::INFINITY, |(_, one)| one.rank())
+    }
+}
+
+/// How many of some searches end within 2 % of the best.
+fn agreeing(runs: &[Run]) -> usize {
+    let best = runs.iter().map(Run::rank).fold(f64::INFINITY, f64::min);
+    runs.iter().filter(|run| run.rank() <= best * (1.0 + AGREE)).count()
+}
 
 impl Tuning<'_> {
     /// Searches; the result has the same bits whatever the threads. Where `stop` said so, the best
@@ -130,44 +253,42 @@ impl Tuning<'_> {
         self.validate()?;
         let tasks: Result<Vec<Ready<'_>>> = self.tasks.iter().map(Judge::ready).collect();
         let tasks = tasks?;
-        let mut best: Option<(Vec<f64>, Tried)> = None;
+        let mut runs: Vec<Run> = Vec::new();
         let mut counts = (0, 0);
         let mut history = Vec::new();
-        for look in 0..2_u64 {
-            let around = (look > 0).then(|| best.as_ref().map(|(place, _)| place.clone()));
-            let settings = SwarmSettings {
-                particles: self.particles,
-                iterations: self.iterations,
-                stall_iterations: STALLED,
-                min_improvement: 0.0,
-                ..SwarmSettings::spso_2011()
-            };
-            let mut swarm = Swarm::new(settings, self.dimensions(), self.seed, look)?;
-            while !(swarm.exhausted() || swarm.stalled() || stop()) {
-                let asked: Vec<Option<Vec<f64>>> = swarm
-                    .ask()
-                    .map(|place| place.map(|place| within(place, around.as_ref())))
-                    .collect();
+        for (sides, times) in ROUNDS {
+            if agreeing(&runs) > 1 || stop() {
+                break;
+            }
+            let numbered = sides.iter().zip(runs.len() as u64..);
+            runs.extend(numbered.map(|(side, run)| self.run(*side, run, times)));
+            loop {
+                let asked: Vec<Vec<Vec<f64>>> = runs.iter().map(Run::asked).collect();
                 let places: Vec<&Vec<f64>> = asked.iter().flatten().collect();
+                if places.is_empty() || stop() {
+                    break;
+                }
                 let tried = self.tried(&places, &tasks, stop)?;
                 counts.0 += tried.len();
                 counts.1 += tried.iter().map(|one| one.figures.len()).sum::<usize>();
-                let mut ranks = tried.iter().map(Tried::rank);
-                let costs: Vec<f64> = asked
-                    .iter()
-                    .map(|place| place.as_ref().and_then(|_| ranks.next()).unwrap_or(f64::INFINITY))
-                    .collect();
-                for (place, one) in places.iter().zip(&tried) {
-                    let beaten = best.as_ref().is_none_or(|(_, best)| one.rank() < best.rank());
-                    if beaten {
-                        best = Some(((*place).clone(), one.clone()));
-                    }
+                let mut rest = tried.as_slice();
+                for (run, places) in runs.iter_mut().zip(&asked).filter(|(_, it)| !it.is_empty()) {
+                    let (own, others) = rest.split_at_checked(places.len()).unwrap_or_default();
+                    rest = others;
+                    run.tell(places, own);
                 }
-                swarm.tell(&costs);
-                let kept = best.as_ref().filter(|(_, best)| best.excess <= 1.0);
-                history.push(kept.map_or(f64::INFINITY, |(_, best)| best.cost));
+                let leads = runs.iter().map(Run::rank).fold(f64::INFINITY, f64::min);
+                for run in &mut runs {
+                    run.give_up(leads);
+                }
+                let kept = runs.iter().filter_map(|run| run.best.as_ref());
+                let kept = kept.filter(|(_, best)| best.excess <= 1.0);
+                history.push(kept.map(|(_, best)| best.cost).fold(f64::INFINITY, f64::min));
             }
         }
+        let (searches, agreeing) = (runs.len(), agreeing(&runs));
+        let best = runs.into_iter().filter_map(|run| run.best);
+        let best = best.min_by(|(_, a), (_, b)| a.rank().total_cmp(&b.rank()));
         let none = || Error::Numerical("no controller could be built from the settings".into());
         let (_, Tried { settings, controllers, robustness, figures, excess, cost }) =
             best.ok_or_else(none)?;
@@ -181,13 +302,54 @@ impl Tuning<'_> {
             candidates: counts.0,
             loops: counts.1,
             history,
+            searches,
+            agreeing,
         })
+    }
+
+    /// Excess and cost of the controllers of some places of the unit box, as the search ranks them:
+    /// of those beyond what is required the cost is infinite.
+    ///
+    /// # Errors
+    /// Those of [`Tuning::search`]; names `place` where one has another number of coordinates.
+    pub fn costs(&self, places: &[Vec<f64>], stop: Stop<'_>) -> Result<Vec<(f64, f64)>> {
+        self.validate()?;
+        self.validate_places(places)?;
+        let tasks: Result<Vec<Ready<'_>>> = self.tasks.iter().map(Judge::ready).collect();
+        let places: Vec<&Vec<f64>> = places.iter().collect();
+        let tried = self.tried(&places, &tasks?, stop)?;
+        let cost = |one: &Tried| if one.excess <= 1.0 { one.cost } else { f64::INFINITY };
+        Ok(tried.iter().map(|one| (one.excess, cost(one))).collect())
+    }
+
+    /// A search from a side.
+    fn run(&self, side: Side, run: u64, times: usize) -> Run {
+        let address = (self.seed, run);
+        let sought = self.axes.iter().flat_map(|axis| &axis.sought);
+        let part: Vec<(f64, f64)> = sought.map(|one| side.part(one.setting)).collect();
+        let starts: &[Vec<f64>] = if side == Side::Inside { &self.starts } else { &[] };
+        let budget = times * self.particles * self.iterations;
+        let evolution = Evolution::new(address, &part, starts, self.particles, budget);
+        Run { address, phase: Phase::Evolving(evolution), refined: budget, best: None }
     }
 
     fn validate(&self) -> Result<()> {
         self.required.validate()?;
         not_negative("effort", self.effort, "m/V")?;
         self.axes.iter().flat_map(|axis| &axis.sought).try_for_each(Sought::validate)?;
+        self.validate_places(&self.starts)?;
+        for (name, count, least) in
+            [("particles", self.particles, LEAST_PARTICLES), ("iterations", self.iterations, 1)]
+        {
+            if count < least {
+                return Err(Error::parameter(name, count, format!("{least} or more")));
+            }
+        }
+        if self.particles.saturating_mul(self.iterations) > MOST_CANDIDATES {
+            let expected =
+                format!("such that times the iterations {MOST_CANDIDATES} at most result");
+            return Err(Error::parameter("particles", self.particles, expected));
+        }
         if self.dimensions() == 0 {
             return Err(Error::parameter("sought", "nothing", "one setting or more"));
         }
@@ -198,6 +360,18 @@ impl Tuning<'_> {
             return Err(Error::parameter("axes", self.axes.len(), "as many as the tasks have"));
         }
         Ok(())
+    }
+
+    fn validate_places(&self, places: &[Vec<f64>]) -> Result<()> {
+        let expected = self.dimensions();
+        let Some(place) = places.iter().find(|place| place.len() != expected) else {
+            return Ok(());
+        };
+        Err(Error::Shape {
+            name: "place".into(),
+            found: format!("{} coordinates", place.len()),
+            expected: format!("{expected}, as many as are sought"),
+        })
     }
 
     /// Settings of all axes.
@@ -294,14 +468,4 @@ impl Tuning<'_> {
         let cost = error + changes;
         if cost.is_finite() { (cost, excess) } else { (f64::INFINITY, f64::INFINITY) }
     }
-}
-
-/// A place of the unit box, or of a smaller one about another place.
-fn within(place: &[f64], around: Option<&Option<Vec<f64>>>) -> Vec<f64> {
-    let Some(Some(middle)) = around else { return place.to_vec() };
-    let nearer = |(place, middle): (&f64, &f64)| {
-        let low = (middle - NEARER).clamp(0.0, 1.0 - 2.0 * NEARER);
-        low + 2.0 * NEARER * place
-    };
-    place.iter().zip(middle).map(nearer).collect()
 }

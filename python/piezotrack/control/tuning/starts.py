@@ -1,0 +1,85 @@
+"""Settings that a search for gains begins with besides random ones."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from .structures import nominal_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from ... import _core
+
+__all__ = ["place_of", "simc"]
+
+# Places of settings of which a start says nothing: as if the part were not there.
+ABSENT = {
+    "kd": 0.0,
+    "cutoff": 1.0,
+    "notch_depth": 1.0,
+    "observer": 0.0,
+    "switching": 1.0,
+    "kq": 0.0,
+}
+# Gains of the rule, and smaller ones where a resonance forbids these.
+SHARES = (1.0, 0.5, 0.25, 0.125)
+
+
+def simc(plants: Sequence[_core.LoopPlant], dt: float) -> list[dict[str, float]]:
+    """Gains of a PI law by Skogestad's rule for a lag with a delay, and shares of them.
+
+    ``Kp = T / (k 2 theta)``, ``Ti = min(T, 8 theta)``: Skogestad 2003, doi
+    10.1016/S0959-1524(02)00062-8, equations (21) to (24) with the closed loop as slow as the delay.
+    The delay theta has half a sampling interval for the hold, and the rule the plant of the highest
+    gain.
+
+    Parameters
+    ----------
+    plants : sequence of LoopPlant
+        Plants of the set.
+    dt : float
+        Sampling interval [s].
+
+    Returns
+    -------
+    list of dict
+        Gains a sample ``kp`` and ``ki`` [V/m].
+    """
+    plant = max(plants, key=lambda one: abs(one.static_gain))
+    delay = plant.matrices()[-1] + 0.5 * dt
+    gain, time = nominal_of(plant)
+    lag = max(time - plant.matrices()[-1], 0.1 * delay)
+    kp = lag / (abs(gain) * 2.0 * delay)
+    ki = kp * dt / min(lag, 8.0 * delay)
+    return [{"kp": share * kp, "ki": share * ki} for share in SHARES]
+
+
+def place_of(
+    settings: Mapping[str, float], ranges: Sequence[tuple[str, float, float, bool]]
+) -> list[float]:
+    """Place of some settings in the unit box of the ranges; the others as if absent.
+
+    Parameters
+    ----------
+    settings : mapping
+        Values by name.
+    ranges : sequence of (str, float, float, bool)
+        Name, lower and upper end of each setting, and whether its scale is logarithmic.
+
+    Returns
+    -------
+    list of float
+        One for each range, 0 to 1.
+    """
+
+    def place(name: str, low: float, high: float, logarithmic: bool) -> float:
+        if name not in settings:
+            return ABSENT.get(name, 0.5)
+        value = min(max(settings[name], low), high)
+        if logarithmic:
+            return math.log(value / low) / math.log(high / low)
+        return (value - low) / (high - low)
+
+    return [place(*one) for one in ranges]
