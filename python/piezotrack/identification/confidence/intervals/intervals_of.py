@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .... import _core
 from ...._support.arguments import one_of
 from ....errors import ParameterError
+from ...fitted.certainty.covariance import normal_reach
 from ...fitted.identification import Identification
 from .bootstrap import bootstrap_confidence
 from .profile import profile_confidence
@@ -41,13 +41,11 @@ def intervals_of(model: IdentifiedModel, level: float, method: str) -> Confidenc
     ParameterError, DataError, NumericalError
         As for `IdentifiedModel.confidence`.
     """
-    share = _core.as_number("level", level)
-    if not 0.0 < share < 1.0:
-        raise ParameterError("level", share, "a number between 0 and 1")
+    normal_reach(level)
     one_of("method", method, ("profile", "bootstrap"))
     if not isinstance(model, Identification):
         raise ParameterError("model", "no record", "what pt.identify returns", verb="has")
     searched = SearchedFit.of(model)
     if method == "profile":
-        return profile_confidence(searched, share)
-    return bootstrap_confidence(searched, share)
+        return profile_confidence(searched, float(level))
+    return bootstrap_confidence(searched, float(level))

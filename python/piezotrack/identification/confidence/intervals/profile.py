@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...fitted.certainty.confidence import Confidence, ParameterInterval
-from ...fitted.certainty.covariance import Interval
+from ...fitted.certainty.covariance import Interval, normal_reach
 from .searched_fit import OF_SHORTEST_LAG
 
 if TYPE_CHECKING:
@@ -51,7 +50,7 @@ def profile_confidence(searched: SearchedFit, level: float) -> Confidence:
         The fit leaves no residual.
     """
     fit, freedom, notes = searched.fit, searched.freedom, []
-    quantile = NormalDist().inv_cdf(0.5 + 0.5 * level) ** 2
+    quantile = normal_reach(level) ** 2
     limited = {one.lower: one.text for one in fit.constraints}
     for name in sorted(set(limited) & set(searched.names.values())):
         notes.append(f"{name} has no profile, as the inequality {limited[name]} moves with it")
