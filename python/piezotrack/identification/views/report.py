@@ -231,7 +231,7 @@ def verdict_sentences(fit: Identification) -> list[str]:
     Returns
     -------
     list of str
-        Sentences; after least squares only which values the error of the model decides.
+        Sentences; after least squares only how many values the error of the model decides.
     """
     if not fit.parameters:
         return [one for one in _certainty(fit) if one]
@@ -269,14 +269,24 @@ def list_sentences(fit: IdentifiedModel) -> list[str]:
 
 
 def _certainty(fit: Identification) -> list[str]:
-    """Say which values the error of the model decides."""
+    """Say which values the error of the model decides, and which are known as a combination."""
     covariance = fit.covariance
     if covariance is None:
         return []
     lines: list[str] = []
-    decided = [name for name in covariance.decided_by_model if name in fit.parameters]
+    decided = covariance.decided_by_model
     if decided:
-        lines.append(f"The error of the model, not the noise, decides: {', '.join(decided)}.")
+        # Weights of plays by their number only.
+        count = f"{len(decided)} of {len(covariance.names)} values"
+        which = ", ".join(decided) if set(decided) <= set(fit.parameters) else count
+        lines.append(f"The error of the model, not the noise, decides {which}.")
+    pairs = [
+        f"{first} and {second} ({correlation:.2f})"
+        for first, second, correlation in covariance.correlated
+        if {first, second} <= set(fit.parameters)
+    ]
+    if pairs:
+        lines.append(f"Correlated, so that a combination is known better: {', '.join(pairs)}.")
     return ["", *lines] if lines else []
 
 
