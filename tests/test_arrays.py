@@ -45,6 +45,8 @@ MODEL = pt.identification.IdentifiedModel(
     stroke=1e-4,
     delay=0.004,
 )
+# A record that the model is judged on.
+RECORD = pt.Dataset(u=np.linspace(0.0, 10.0, 40), y=np.linspace(0.0, 1e-5, 40), dt=DT)
 
 
 class Taker(NamedTuple):
@@ -84,6 +86,9 @@ TAKERS: dict[str, Taker] = {
         lambda u: np.array([len(MODEL.extrapolation_notes(u, DT))])
     ),
     "IdentifiedModel.displacement": Taker(lambda u: MODEL.displacement(u, DT)),
+    "IdentifiedModel.prediction_band": Taker(
+        lambda u: MODEL.prediction_band(u, DT, records=[RECORD]).upper
+    ),
     "Dataset": Taker(
         lambda u, y, c: (
             (log := pt.Dataset(u=u, y=y, dt=DT, columns={"c": c})).columns["c"] + log.u + log.y

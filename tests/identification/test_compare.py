@@ -29,7 +29,7 @@ PLAYS = pt.PrandtlIshlinskiiStage(
     weights=(0.1e-6, 0.2e-6, 0.15e-6, 0.12e-6),
 )
 NOISE = 0.05e-6
-PAIR = ["bouc-wen", "prandtl-ishlinskii"]
+PAIR = ["dahl", "prandtl-ishlinskii"]
 
 
 @cache
@@ -53,11 +53,12 @@ def row(name: str, of: pt.identification.Comparison | None = None) -> pt.identif
 
 
 def test_a_model_is_what_identify_finds_on_the_fitted_part() -> None:
-    compared_row = row("bouc-wen")
-    alone = pt.identify(log()[1.0:5.0], "bouc-wen", method=pt.Descents(seed=1))
+    compared_row = row("dahl")
+    alone = pt.identify(log()[1.0:5.0], "dahl", method=pt.Descents(seed=1))
     assert compared_row.fit.document() == alone.document()
-    assert compared_row.train.rms == pytest.approx(alone.cost, rel=1e-9)
-    assert compared_row.title == "Bouc-Wen"
+    # A search simulates with fewer sub-steps.
+    assert compared_row.train.rms == pytest.approx(alone.cost, rel=1e-4)
+    assert compared_row.title == "Dahl, second order"
     assert comparison_of_pair().fits == {one.name: one.fit for one in comparison_of_pair().rows}
 
 
@@ -84,9 +85,9 @@ def test_what_the_record_is_made_of_is_best() -> None:
     # Nothing but the noise is left, where it was fitted and where not.
     assert comparison_of_pair().best.train.rms == pytest.approx(NOISE, rel=0.1)
     assert comparison_of_pair().best.test.rms == pytest.approx(NOISE, rel=0.15)
-    assert row("bouc-wen").test.rms > 2.5 * NOISE
+    assert row("dahl").test.rms > 2.5 * NOISE
     assert abs(comparison_of_pair().best.autocorrelation) < 0.15
-    assert row("bouc-wen").autocorrelation > 0.8
+    assert row("dahl").autocorrelation > 0.8
 
 
 def test_the_criteria_are_burnham_and_andersons() -> None:
@@ -94,9 +95,9 @@ def test_the_criteria_are_burnham_and_andersons() -> None:
     for each in comparison_of_pair().rows:
         error = data.y - each.fit.simulate(data, offset=each.fit.offset).x
         n, rss = error.size, float(np.sum(error**2))
-        # b/k, d, alpha, beta, gamma, n, as nothing excites a mode of some mass; w0, twenty weights,
+        # T, D, a1, a2, b1, as nothing excites a mode of some mass; w0, twenty weights,
         # two bends, no lag, as there is none; the offset each.
-        free = 7 if each.name == "bouc-wen" else 24
+        free = 6 if each.name == "dahl" else 24
         assert each.parameters == free
         likelihood = n * np.log(rss / n)
         assert each.aic == pytest.approx(likelihood + 2 * (free + 1), rel=1e-12)
@@ -201,14 +202,14 @@ def test_the_table_marks_the_best() -> None:
     assert lines[1].endswith("600 samples; state and offset carried over")
     marked = [line[:20] for line in lines if line[2:20].strip() in ("Prandtl-Ishlinskii",)]
     assert marked == ["* Prandtl-Ishlinskii", "  Prandtl-Ishlinskii"]
-    above, below = (line for line in lines if line.startswith("  Bouc-Wen"))
-    figures = [float(text) for text in (above + below.partition("Wen")[2]).split()[1:]]
-    shown = row("bouc-wen")
+    rows = [line.partition("order")[2] for line in lines if line.startswith("  Dahl, second order")]
+    figures = [float(text) for text in "".join(rows).split()]
+    shown = row("dahl")
     scores = [shown.train.rms, shown.test.rms, shown.test.max_error]
     assert [figures[i] for i in (0, 2, 4)] == pytest.approx([1e6 * s for s in scores], rel=1e-3)
     explained = 100.0 * (1.0 - shown.test.rms / float(np.std(comparison_of_pair().test.y)))
     assert figures[5] == pytest.approx(explained, rel=1e-3)
-    assert figures[6] == 7
+    assert figures[6] == 6
     best = comparison_of_pair().best
     assert shown.aic is not None
     assert best.aic is not None
@@ -245,7 +246,7 @@ def test_the_picture_has_loops_bars_and_an_error_for_each() -> None:
     assert off.get_xlabel() == "drive [V]"
     assert loops.get_ylabel() == "displacement [um]"
     labels = [line.get_label() for line in loops.lines]
-    assert labels == ["measured", "Bouc-Wen", "Prandtl-Ishlinskii"]
+    assert labels == ["measured", "Dahl, second order", "Prandtl-Ishlinskii"]
     # Told apart without colours.
     assert len({line.get_linestyle() for line in loops.lines[1:]}) == 2
     # The loop is one cycle of what was not fitted, where one of them is furthest off.
@@ -285,7 +286,7 @@ def test_another_record_is_drawn_behind_the_first() -> None:
 
 def test_it_is_saved_with_its_models(tmp_path: Path) -> None:
     written = comparison_of_pair().save(tmp_path / "out")
-    models = ["bouc-wen.json", "prandtl-ishlinskii.json"]
+    models = ["dahl.json", "prandtl-ishlinskii.json"]
     expected = ["comparison.json", "comparison.png", "comparison.svg", *models]
     assert sorted(path.name for path in written) == names(str(tmp_path / "out")) == sorted(expected)
     for each in comparison_of_pair().rows:
@@ -358,7 +359,7 @@ def _logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("file").write_text("not a folder", encoding="utf-8")
 
 
-MODELS = ("--model", "bouc-wen", "--model", "prandtl-ishlinskii", "--runs", "1", "--seed", "1")
+MODELS = ("--model", "dahl", "--model", "prandtl-ishlinskii", "--runs", "1", "--seed", "1")
 
 
 @pytest.mark.usefixtures("_logs")

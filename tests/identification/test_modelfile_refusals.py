@@ -144,8 +144,17 @@ COVARIANCE: dict[str, Any] = {
     [
         ("matrix", [[1.0], [0.5]], "covariance: matrix has 2 rows: expected the lower triangle"),
         ("matrix", [[1.0], [None, 2.0]], "covariance: matrix has null: expected finite numbers"),
-        ("values", [0.2], "covariance: values has 1 entries: expected 2"),
+        ("matrix", [[-1.0], [0.5, 2.0]], "covariance: matrix has a variance below 0"),
+        ("values", [0.2], "covariance: values has another form: expected 2 numbers"),
+        ("factors", [1.0, "<script>"], "covariance: factors has another form: expected 2 numbers"),
+        ("shifts", [[0.0, 1.0], [0.0]], "covariance: shifts has another form: expected 2 x 2"),
+        ("hidden", [[1.0]], "covariance: hidden has another form: expected any x 2 numbers"),
         ("samples", -1, "covariance: samples is -1"),
+        (
+            "names",
+            ["mass", "weights[1]"],
+            "covariance: names has 'weights[1]': expected numbers of",
+        ),
         ("names", None, "an entry is not of the form that 'save' writes"),
     ],
 )

@@ -59,6 +59,12 @@ class Value(NamedTuple):
     def __str__(self) -> str:
         return self.parameter if self.entry is None else f"{self.parameter}[{self.entry}]"
 
+    @classmethod
+    def named(cls, name: str) -> Value:
+        """Return the number that is written as ``"weights[2]"``."""
+        parameter, _, entry = name.removesuffix("]").partition("[")
+        return cls(parameter, int(entry) if entry else None)
+
     def of(self, model: IdentifiedModel) -> float:
         """Return the number in a model, SI."""
         if self.parameter == DELAY:
@@ -101,8 +107,11 @@ def fitted_values(model: IdentifiedModel) -> list[Value]:
     Returns
     -------
     list of Value
-        Entries of lists one by one; the delay of one record last.
+        Entries of lists one by one; the delay of one record last. Where the covariance is known,
+        those that it has.
     """
+    if model.covariance is not None:
+        return [Value.named(name) for name in model.covariance.names]
     entries = _entries(model)
     free = {name for name, entry in entries.items() if entry.get("free", False)}
     bounded = {name for name in free if entries[name].get("at_bound", False)}

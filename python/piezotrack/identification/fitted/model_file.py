@@ -115,13 +115,25 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
             drift=drift_of(document.get("drift")),
             records=_records(document, stage_class(info)._state),
             interpolation=_interpolation(document.get("interpolation")),
-            covariance=covariance_of_file(document.get("covariance")),
+            covariance=covariance_of_file(document.get("covariance"), _numbers_of(stage)),
             details={
                 "parameters": {key: _fit_details(entry) for key, entry in parameters.items()},
                 "delay": _fit_details(delay),
                 **{key: value for key, value in document.items() if key not in OWN},
             },
         )
+
+
+def _numbers_of(stage: Stage) -> set[str]:
+    """Return the names of the numbers of a stage, entries of lists one by one, and of the delay."""
+    names = {"delay"}
+    for name in stage.parameter_names():
+        value = getattr(stage, name)
+        entries = (
+            [f"{name}[{k}]" for k in range(len(value))] if isinstance(value, tuple) else [name]
+        )
+        names |= {one for one in entries if value is not None}
+    return names
 
 
 def stage_of(info: ModelInfo, parameters: dict[str, Any], drive: str) -> Stage:

@@ -170,7 +170,7 @@ impl Side {
     }
 }
 
-/// What a search does at present.
+/// Phase of a search.
 enum Phase {
     Evolving(Evolution),
     Refining(Adaptation),

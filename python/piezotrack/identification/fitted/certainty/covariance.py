@@ -15,6 +15,8 @@ from ...._support.messages import quoted
 from ....errors import ParameterError
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -326,13 +328,15 @@ def covariance_entry(covariance: Covariance | None) -> dict[str, Any]:
     return {"covariance": entry}
 
 
-def covariance_of_file(entry: Any) -> Covariance | None:
+def covariance_of_file(entry: Any, known: Collection[str]) -> Covariance | None:
     """Read the covariance of a model file.
 
     Parameters
     ----------
     entry : Any
         What `covariance_entry` wrote; None where the file has none.
+    known : collection of str
+        Names of the numbers that the model has.
 
     Returns
     -------
@@ -347,39 +351,50 @@ def covariance_of_file(entry: Any) -> Covariance | None:
     if entry is None:
         return None
     found = object_of("covariance", entry)
-    names = [str(name) for name in found["names"]]
-    matrix = np.zeros((len(names), len(names)))
-    rows = found["matrix"]
-    if [len(row) for row in rows] != list(range(1, len(names) + 1)):
-        expected = f"the lower triangle of {len(names)} rows, one for each name"
+    names = tuple(str(name) for name in found["names"])
+    if strange := [name for name in names if name not in known]:
+        expected = "numbers of the model, as stiffness or weights[2]"
+        raise ParameterError("covariance: names", quoted(strange[0]), expected, verb="has")
+    count, rows = len(names), found["matrix"]
+    if not names or [len(row) for row in rows] != list(range(1, count + 1)):
+        expected = f"the lower triangle of {count} rows, one for each name"
         raise ParameterError("covariance: matrix", f"{len(rows)} rows", expected, verb="has")
+    matrix = np.zeros((count, count))
     for i, row in enumerate(rows):
-        matrix[i, : i + 1] = matrix[: i + 1, i] = _numbers("matrix", row)
-    lists = {name: _numbers(name, found[name]) for name in LISTS}
-    for name, numbers in lists.items():
-        if numbers.shape != ((len(names), 2) if name == "shifts" else (len(names),)):
-            raise ParameterError(
-                f"covariance: {name}", f"{len(numbers)} entries", f"{len(names)}", verb="has"
-            )
+        matrix[i, : i + 1] = matrix[: i + 1, i] = _numbers("matrix", row, (i + 1,))
+    if np.diag(matrix).min() < 0.0:
+        raise ParameterError("covariance: matrix", "a variance below 0", "0 or above", verb="has")
+    lists = {
+        name: _numbers(name, found[name], (count, 2) if name == "shifts" else (count,))
+        for name in LISTS
+    }
     shares = {
         name: _core.as_number(f"covariance: {name}", part["value"])
         for name, part in object_of("covariance: shares", found.get("shares")).items()
     }
     return Covariance(
-        names=tuple(names),
+        names=names,
         matrix=matrix,
         **{**lists, "determined": lists["determined"] != 0.0},
         samples=_core.as_count("covariance: samples", found["samples"]),
         orders=tuple(_core.as_count("covariance: orders", order) for order in found["orders"]),
-        hidden=_numbers("hidden", found["hidden"]).reshape(-1, len(names)),
+        hidden=_numbers("hidden", found["hidden"] or np.empty((0, count)), (None, count)),
         predicted=_core.as_number("covariance: predicted", found["predicted"]["value"]),
         shares=NoiseShares(**shares) if shares else None,
     )
 
 
-def _numbers(name: str, values: Any) -> Array:
+def _numbers(name: str, values: Any, shape: tuple[int | None, ...]) -> Array:
     """Take a list of numbers of a file; what is not finite is null there."""
-    numbers = np.array(values, dtype=np.float64)
+    try:
+        numbers = np.array(values, dtype=np.float64)
+    except ValueError:
+        numbers = np.empty(())
+    if numbers.ndim != len(shape) or any(
+        size not in (None, found) for size, found in zip(shape, numbers.shape, strict=True)
+    ):
+        sizes = " x ".join("any" if size is None else f"{size}" for size in shape)
+        raise ParameterError(f"covariance: {name}", "another form", f"{sizes} numbers", verb="has")
     finite = name not in ("determined", "independent", "shifts")
     if finite and not np.isfinite(numbers).all():
         raise ParameterError(f"covariance: {name}", "null", "finite numbers", verb="has")
