@@ -84,7 +84,12 @@ COMMAND: dict[str, Any] = {"color": GREY, "linewidth": 2.6, "label": "command"}
 FEEDFORWARD: dict[str, Any] = {"color": PURPLE, "linewidth": 1.0, "label": "feedforward"}
 FEEDBACK: dict[str, Any] = {"color": ORANGE, "linewidth": 1.0, "label": "feedback"}
 REPETITIVE: dict[str, Any] = {"color": GREEN, "linewidth": 1.0, "label": "repetitive"}
-BAND: dict[str, Any] = {"color": BLUE, "alpha": 0.2, "linewidth": 0.0, "label": "95 % expected"}
+BAND: dict[str, Any] = {
+    "color": BLUE,
+    "alpha": 0.2,
+    "linewidth": 0.0,
+    "label": "95 % on cycles like those fitted",
+}
 LIMITS: dict[str, Any] = {"color": "0.3", "linewidth": 0.9, "linestyle": "-.", "label": "limits"}
 CLIPPED: dict[str, Any] = {"color": "#f3dfa8", "zorder": 0, "linewidth": 1.0, "label": "clipped"}
 # A line through zero, a level that is read off, and numbers that were read off.

@@ -46,7 +46,7 @@ def _measured(result: Output, seed: int) -> None:
     """Run the demonstration on the two measured logs of the package."""
     from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
     from ...data.log_file import write_log
-    from ...identification.views.plot import plot_loop, plot_time, what_was_shown
+    from ...identification.views.plot import band_of, plot_loop, plot_time, what_was_shown
     from ...identification.views.report import identification_files, save_identification
     from .demonstration import run_demo
     from .loop_plot import plot_before_and_after
@@ -60,7 +60,7 @@ def _measured(result: Output, seed: int) -> None:
     title = what_was_shown(fit, other, run)
     figures = (
         plot_loop(other, run, title=title).figure,
-        plot_time(other, run, stroke=fit.stroke, title=title)[0].figure,
+        plot_time(other, run, stroke=fit.stroke, half=band_of(fit, other), title=title)[0].figure,
         plot_before_and_after(demo.runs),
     )
     with result_set(make_folder(result.out)) as folder:

@@ -228,7 +228,7 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
 def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]:
     """Write the model and the pictures, those of a second log too."""
     from ..._support.files.writing import make_folder, result_set, save_figures
-    from ...identification.views.plot import plot_loop, plot_time, what_was_shown
+    from ...identification.views.plot import band_of, plot_loop, plot_time, what_was_shown
     from ...identification.views.report import save_identification
 
     name = fit.model.info.name
@@ -238,7 +238,7 @@ def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]
         title = what_was_shown(fit, second, run)
         axes = (
             plot_loop(second, run, title=title),
-            plot_time(second, run, stroke=fit.stroke, title=title)[0],
+            plot_time(second, run, stroke=fit.stroke, half=band_of(fit, second), title=title)[0],
         )
         figures = {
             f"{name}_validation_{panel}": one.figure

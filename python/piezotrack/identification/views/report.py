@@ -476,7 +476,7 @@ def save_identification(
         ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, after a
         search, ``{name}_convergence``; of a second record ``{name}_loop_2`` and ``{name}_time_2``.
     """
-    from .plot import named, plot_convergence, plot_loop, plot_time, what_was_fitted
+    from .plot import band_of, named, plot_convergence, plot_loop, plot_time, what_was_fitted
 
     name = fit.model.info.name if name is None else name
     until = None if shown is None else float(fit.data.t[-1])
@@ -487,7 +487,14 @@ def save_identification(
             continue
         run = fit.simulate(data, offset=record.offset)
         title = what_was_fitted(fit, record)
-        above, _ = plot_time(data, run, stroke=record.stroke, fitted_until=until, title=title)
+        above, _ = plot_time(
+            data,
+            run,
+            stroke=record.stroke,
+            fitted_until=until,
+            half=band_of(fit, data),
+            title=title,
+        )
         figures[f"{name}_loop{_nth(i)}"] = plot_loop(data, run, title=title).figure
         figures[f"{name}_time{_nth(i)}"] = above.figure
     if fit.model.info.searched:
