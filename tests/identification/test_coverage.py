@@ -16,8 +16,8 @@ BENCH = Path(__file__).parents[2] / "benches" / "coverage"
 # Goal of every cell, records of each, and their binomial error, twice.
 LEAST, MOST, RECORDS = 0.92, 0.98, 60
 ERROR = 2.0 * np.sqrt(0.95 * 0.05 / RECORDS)
-# What takes seconds for each record is left to the bench.
-LONG = ("LuGre", "oscillator", "Bouc-Wen, exponent 2")
+# What takes seconds for each record is left to the bench: an exponent is tried in coloured noise.
+LONG = ("LuGre", "oscillator", "Bouc-Wen", "Bouc-Wen, exponent 2")
 
 
 def loaded(name: str) -> Any:
