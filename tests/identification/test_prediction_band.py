@@ -12,6 +12,7 @@ import pytest
 import piezotrack as pt
 from piezotrack.data.checks.diagnostics import turns
 from piezotrack.identification.confidence.held_out import HeldOut, held_out
+from piezotrack.identification.confidence.sensitivity import fitted_values, sensitivity
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,13 +58,17 @@ def fitted(seed: int = 1, *, richer: bool = False) -> pt.identification.Identifi
     return identified(record(seed, RICHER if richer else STAGE))
 
 
+def known_cycles(fit: pt.identification.Identification) -> HeldOut:
+    return held_out(fit, [(fit.data, 1.0)], [sensitivity(fit, fit.data, fitted_values(fit))])
+
+
 def test_the_errors_of_a_cycle_are_those_of_a_fit_without_it() -> None:
     fit = fitted(richer=True)
-    errors = held_out(fit, [(fit.data, 1.0)])
+    errors = known_cycles(fit)
     ends = turns(fit.data.u)[1::2]
-    assert errors.parts == len(ends) + 1
-    for part in (2, 5, errors.parts - 2):
-        kept = errors.part != part
+    assert errors.cycles() == len(ends) + 1
+    for part in (2, 5, errors.cycles() - 2):
+        kept = errors.cycle != part
         y = np.where(kept, fit.data.y, np.nan)
         without = pt.Dataset(u=fit.data.u, y=y, dt=DT, missing="drop")
         expected = np.abs(fit.data.y - identified(without).simulate(without).x)[~kept]
@@ -87,7 +92,7 @@ def test_a_new_cycle_is_within_the_quantile(parts: int, unequal: float) -> None:
             errors=errors[:-1].ravel(),
             amplitude=flat,
             rate=flat,
-            part=np.repeat(np.arange(parts), 50),
+            cycle=np.repeat(np.arange(parts), 50),
         )
         within.append(np.mean(errors[-1] <= known.quantile(0.9)))
     # 0.9 or more, to three deviations of the mean.
@@ -131,7 +136,7 @@ def test_a_larger_drive_is_unlike_the_records_and_its_errors_larger() -> None:
     same, larger = (fit.prediction_band(times * drive(1), DT) for times in (1.0, 1.5))
     assert not same.unlike.any()
     assert larger.unlike.any()
-    errors = held_out(fit, [(fit.data, 1.0)])
+    errors = known_cycles(fit)
     ends = np.array([errors.amplitude.max()]), np.array([errors.rate.max()])
     at, above = (errors.at(times * ends[0], ends[1], 0.95, NOISE) for times in (1.0, 1.5))
     assert above.model_error == pytest.approx(1.5 * at.model_error)
@@ -163,7 +168,7 @@ def test_a_model_from_a_file_predicts_with_records(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.half, fit.prediction_band(drive(3), DT).half)
     # Errors of a record that was not fitted are what they are.
     other = record(60, RICHER)
-    errors = held_out(stored, [(other, 1.0)])
+    errors = held_out(stored, [(other, 1.0)], [None])
     np.testing.assert_allclose(errors.errors, np.abs(other.y - stored.simulate(other).x))
 
 

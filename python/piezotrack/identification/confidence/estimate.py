@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, Literal
@@ -15,7 +16,7 @@ from ..fitted.certainty.covariance import Covariance, NoiseShares
 from ..solve.search import details_of
 from ..solve.selection import SAME_PERIOD, period_of
 from .held_out import held_out
-from .sensitivity import DELAY, Value, fitted_values, gradient, sensitivity
+from .sensitivity import DELAY, Value, fitted_values, gradient, sensitivity, sizes_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from .sensitivity import Sensitivity
 
     Array = NDArray[np.float64]
+    Records = Sequence[tuple[Dataset, float]]
+    Noise = Literal["not repeated", "residual"]
 
 __all__ = ["covariance_of", "with_covariance", "without_repeated"]
 
@@ -54,12 +57,13 @@ def with_covariance(fit: Identification) -> Identification:
         With `Identification.covariance`; None there, and no deviations, where the record is too
         short or nothing was fitted.
     """
-    try:
-        records = [(one.data, one.weight) for one in fit.records if one.data is not None]
-        covariance = covariance_of(fit, records)
-    except PiezotrackError:
-        covariance = None
-    known = [{} for _ in fit.records] if covariance is None else _of_each_record(fit, covariance)
+    records = [(one.data, one.weight) for one in fit.records if one.data is not None]
+    covariance: Covariance | None = None
+    known: list[dict[str, float]] = [{} for _ in fit.records]
+    with suppress(PiezotrackError):
+        linear = _linearised(fit, records)
+        covariance = _covariance(fit, records, linear, "not repeated")
+        known = _of_each_record(fit, records, linear, covariance)
     parameters = {
         name: estimate._replace(deviation=_deviation(fit, covariance, name, estimate, known[0]))
         for name, estimate in fit.parameters.items()
@@ -99,7 +103,12 @@ def _deviation(
     return known.get(name, estimate.deviation)
 
 
-def _of_each_record(fit: Identification, covariance: Covariance) -> list[dict[str, float]]:
+def _of_each_record(
+    fit: Identification,
+    records: Records,
+    linear: list[Sensitivity],
+    covariance: Covariance,
+) -> list[dict[str, float]]:
     """Return the standard deviations of what was fitted to each record alone."""
     free = [
         {name for name, one in record.parameters.items() if one.free and not one.at_bound}
@@ -112,9 +121,7 @@ def _of_each_record(fit: Identification, covariance: Covariance) -> list[dict[st
     if not any(free):
         return known
     values = fitted_values(fit)
-    sizes = _sizes(fit, values)
-    records = [(one.data, one.weight) for one in fit.records if one.data is not None]
-    linear = [sensitivity(fit, data, values) for data, _ in records]
+    sizes = sizes_of(fit, values, records[0][0].dt)
     rows = [(r, name) for r, one in enumerate(linear) for name in one.alone if name in free[r]]
     extended = [
         _Linear(_with_rows(one, r, rows), data, weight, np.append(sizes, np.ones(len(rows))))
@@ -144,9 +151,9 @@ def _with_rows(linear: Sensitivity, record: int, rows: list[tuple[int, str]]) ->
 
 def covariance_of(
     model: IdentifiedModel,
-    records: Sequence[tuple[Dataset, float]],
+    records: Records,
     *,
-    noise: Literal["not repeated", "residual"] = "not repeated",
+    noise: Noise = "not repeated",
 ) -> Covariance:
     """Return the covariance of what was fitted to records.
 
@@ -169,11 +176,23 @@ def covariance_of(
     DataError
         The records have too few samples, or no value was fitted.
     """
+    return _covariance(model, records, _linearised(model, records), noise)
+
+
+def _linearised(model: IdentifiedModel, records: Records) -> list[Sensitivity]:
+    """Return each record about a model."""
     values = fitted_values(model)
     if not values:
         raise DataError("no value was fitted: expected one or more")
-    sizes = _sizes(model, values)
-    at = [sensitivity(model, data, values) for data, _ in records]
+    return [sensitivity(model, data, values) for data, _ in records]
+
+
+def _covariance(
+    model: IdentifiedModel, records: Records, at: list[Sensitivity], noise: Noise
+) -> Covariance:
+    """Return the covariance of what was fitted to records that are linearised."""
+    values = fitted_values(model)
+    sizes = sizes_of(model, values, records[0][0].dt)
     linear = [
         _Linear(one, data, weight, sizes, noise)
         for one, (data, weight) in zip(at, records, strict=True)
@@ -213,11 +232,6 @@ def covariance_of(
     )
 
 
-def _sizes(model: IdentifiedModel, values: list[Value]) -> Array:
-    """Sizes of the values, SI; 1 of one that is 0."""
-    return np.array([abs(value.of(model)) or 1.0 for value in values], dtype=np.float64)
-
-
 def _precision(model: IdentifiedModel, values: list[Value]) -> Array:
     """Inverse squares of the widths of the priors, SI; 0 without one."""
     entries = model.details.get("parameters", {})
@@ -236,7 +250,7 @@ class _Linear:
         data: Dataset,
         weight: float,
         sizes: Array,
-        noise: Literal["not repeated", "residual"] = "not repeated",
+        noise: Noise = "not repeated",
     ) -> None:
         self.columns, self.nuisance = linear.columns * sizes[:, None], linear.nuisance
         self.residual, self.weight = linear.residual, weight

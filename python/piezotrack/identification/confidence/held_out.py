@@ -1,4 +1,4 @@
-"""Errors of a model on parts of records that it does not know, by amplitude and rate."""
+"""Errors of a model on cycles of records that it does not know, by amplitude and rate."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...data.checks.diagnostics import amplitudes, turns
-from .sensitivity import fitted_values, sensitivity
+from .sensitivity import fitted_values, sizes_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from ...data.dataset import Dataset
     from ..fitted.identified_model import IdentifiedModel
-    from .sensitivity import Sensitivity, Value
+    from .sensitivity import Sensitivity
 
     Array = NDArray[np.float64]
     Places = NDArray[np.intp]
 
-__all__ = ["HeldOut", "Parts", "held_out"]
+__all__ = ["HalfWidths", "HeldOut", "held_out"]
 
-# Most parts of a record, and fewest of a class of amplitude and rate.
+# Most cycles of a record, beyond which several are taken as one, and fewest of a class.
 MOST, FEWEST = 200, 5
 # Classes of amplitude, and of rate in each.
 CLASSES = 3
@@ -33,7 +33,7 @@ CLASSES = 3
 MARGIN = 1.05
 
 
-class Parts(NamedTuple):
+class HalfWidths(NamedTuple):
     """Half widths of the band of a prediction.
 
     Attributes
@@ -60,21 +60,20 @@ class HeldOut:
         Size of the error of each sample [m].
     amplitude, rate : ndarray, shape (n,)
         Amplitude [V] and size of the rate [V/s] of the drive there.
-    part : ndarray of int, shape (n,)
+    cycle : ndarray of int, shape (n,)
         Number of the cycle of the drive, which was left out of the fit for its own errors.
     """
 
     errors: Array
     amplitude: Array
     rate: Array
-    part: Places
+    cycle: Places
 
-    @property
-    def parts(self) -> int:
-        """Number of parts."""
-        return int(np.unique(self.part).size)
+    def cycles(self, kept: NDArray[np.bool_] | slice = slice(None)) -> int:
+        """Count the cycles of which there are samples among some."""
+        return int(np.unique(self.cycle[kept]).size)
 
-    def quantile(self, level: float, kept: NDArray[np.bool_] | None = None) -> float:
+    def quantile(self, level: float, kept: NDArray[np.bool_] | slice = slice(None)) -> float:
         """Return what the error of a new cycle stays below with a probability.
 
         Parameters
@@ -93,10 +92,9 @@ class HeldOut:
         """
         from scipy.special import ndtri, stdtrit
 
-        use = slice(None) if kept is None else kept
-        errors, part = self.errors[use], self.part[use]
-        counts = np.bincount(part)
-        squares = np.bincount(part, weights=errors**2)[counts > 0] / counts[counts > 0]
+        errors, cycle = self.errors[kept], self.cycle[kept]
+        counts = np.bincount(cycle)
+        squares = np.bincount(cycle, weights=errors**2)[counts > 0] / counts[counts > 0]
         enlarged = 1.0
         if squares.size > 1 and (spread := float(squares.var(ddof=1))) > 0.0:
             freedom = max(squares.size - 1.0, 2.0 * float(squares.mean()) ** 2 / spread)
@@ -105,7 +103,7 @@ class HeldOut:
             enlarged = float(stdtrit(min(freedom, 1e6), upper) / ndtri(upper))
         return enlarged * float(np.quantile(errors, level))
 
-    def at(self, amplitude: Array, rate: Array, level: float, noise: float) -> Parts:
+    def at(self, amplitude: Array, rate: Array, level: float, noise: float) -> HalfWidths:
         """Return what errors under another drive stay below with a probability.
 
         Parameters
@@ -119,34 +117,32 @@ class HeldOut:
 
         Returns
         -------
-        Parts
+        HalfWidths
             By the noise and by the error of the model.
         """
-        everything = np.ones(self.errors.size, dtype=np.bool_)
         by_noise, by_model = np.empty(amplitude.size), np.empty(amplitude.size)
-        by_noise[:], by_model[:] = self._parted(everything, level, noise)
+        by_noise[:], by_model[:] = self._shared(slice(None), level, noise)
         for here, there in self._classes(self.amplitude, amplitude, None):
             for kept, placed in self._classes(self.rate, rate, (here, there)):
-                use = next((one for one in (kept, here) if self._parts(one) >= FEWEST), None)
+                use = next((one for one in (kept, here) if self.cycles(one) >= FEWEST), None)
                 if use is not None:
-                    by_noise[placed], by_model[placed] = self._parted(use, level, noise)
+                    by_noise[placed], by_model[placed] = self._shared(use, level, noise)
         above = np.maximum(
             amplitude / max(float(self.amplitude.max()), 1e-300),
             rate / max(float(self.rate.max()), 1e-300),
         )
         by_model *= np.where(above > MARGIN, above, 1.0)
         unlike = (above > MARGIN) | (amplitude * MARGIN < self.amplitude.min())
-        return Parts(by_noise, by_model, unlike)
+        return HalfWidths(by_noise, by_model, unlike)
 
-    def _parted(self, kept: NDArray[np.bool_], level: float, noise: float) -> tuple[float, float]:
-        """Return the quantile of some errors in two, as their mean squares are."""
+    def _shared(
+        self, kept: NDArray[np.bool_] | slice, level: float, noise: float
+    ) -> tuple[float, float]:
+        """Return the quantile of some errors, shared by noise and model as their mean square is."""
         power = float(np.mean(self.errors[kept] ** 2))
         share = min(noise**2 / power, 1.0) if power > 0.0 else 1.0
         size = self.quantile(level, kept)
         return size * math.sqrt(share), size * math.sqrt(1.0 - share)
-
-    def _parts(self, kept: NDArray[np.bool_]) -> int:
-        return int(np.unique(self.part[kept]).size)
 
     @staticmethod
     def _classes(
@@ -165,7 +161,7 @@ class HeldOut:
 def held_out(
     model: IdentifiedModel,
     records: Sequence[tuple[Dataset, float]],
-    linear: Sequence[Sensitivity | None] | None = None,
+    linear: Sequence[Sensitivity | None],
 ) -> HeldOut:
     r"""Find the errors of a model on each cycle of records, for a fit without that cycle.
 
@@ -183,28 +179,25 @@ def held_out(
         The model.
     records : sequence of (Dataset, float)
         The records with their weights.
-    linear : sequence of Sensitivity or None, optional
-        Each record linearised, where it is known already.
+    linear : sequence of Sensitivity or None
+        Each record about the model; None of one that was not fitted.
 
     Returns
     -------
     HeldOut
-        Of the readings that count. A record without a whole cycle is one part, whose errors are
-        those of the fit.
+        Of the readings that count. A record without a whole cycle is one, whose errors are those of
+        the fit.
     """
-    values = fitted_values(model)
-    linear = [None] * len(records) if linear is None else linear
     known = [
-        _Record(model, data, weight, values, at)
-        for (data, weight), at in zip(records, linear, strict=True)
+        _Record(model, data, weight, at) for (data, weight), at in zip(records, linear, strict=True)
     ]
-    normal = _Normal(known, len(values))
+    normal = _Normal(known, len(fitted_values(model)))
     first = np.cumsum([0, *(one.count for one in known)])
     return HeldOut(
         errors=np.abs(np.concatenate([normal.left(i) for i in range(len(known))])),
         amplitude=np.concatenate([one.amplitude for one in known]),
         rate=np.concatenate([one.rate for one in known]),
-        part=np.concatenate([one.part + k for one, k in zip(known, first, strict=False)]),
+        cycle=np.concatenate([one.cycle + k for one, k in zip(known, first, strict=False)]),
     )
 
 
@@ -216,24 +209,22 @@ class _Record:
         model: IdentifiedModel,
         data: Dataset,
         weight: float,
-        values: list[Value],
         linear: Sensitivity | None,
     ) -> None:
-        self.fitted = bool(values) and (linear is not None or model._fitted_share(data) > 0.0)
         data = data.without_far_readings()
         self.rate = np.abs(data.counted(np.gradient(data.u, data.dt)))
         self.amplitude = data.counted(amplitudes(data.u))
         # From every second turn of the drive to the next.
         ends = np.array(turns(data.u)[1::2], dtype=np.intp)
         ends = ends[:: -(-ends.size // MOST)] if ends.size else ends
-        part = np.searchsorted(ends, np.arange(len(data)), side="right")
-        self.part = np.unique(data.counted(part.astype(np.float64)), return_inverse=True)[1]
-        self.count = int(self.part.max()) + 1
-        if not self.fitted:
+        cycle = np.searchsorted(ends, np.arange(len(data)), side="right")
+        self.cycle = np.unique(data.counted(cycle.astype(np.float64)), return_inverse=True)[1]
+        self.count = int(self.cycle.max()) + 1
+        self.fitted = linear is not None
+        if linear is None:
             self.error = np.asarray(data.counted(data.y - model.simulate(data).x))
             return
-        linear = sensitivity(model, data, values) if linear is None else linear
-        sizes = np.array([abs(value.of(model)) or data.dt for value in values])
+        sizes = sizes_of(model, fitted_values(model), data.dt)
         self.error = math.sqrt(weight) * linear.residual
         lengths = np.linalg.norm(linear.nuisance, axis=1, keepdims=True)
         self.columns = math.sqrt(weight) * (linear.columns * sizes[:, None]).T
@@ -254,7 +245,7 @@ class _Normal:
             if one.fitted:
                 places, columns = self._of(i)
                 self.products[np.ix_(places, places)] += columns.T @ columns
-        # A value is not known to be beyond its own size, however little a part says of it.
+        # A value is known to within its own size, however little a cycle says of it.
         squares = [float(np.mean(one.error**2)) for one in fitted]
         ridge = np.full(self.products.shape[0], 1e-12)
         ridge[:count] = max(squares, default=0.0)
@@ -273,8 +264,8 @@ class _Normal:
             return one.error
         places, columns = self._of(i)
         left = np.empty_like(one.error)
-        for part in range(one.count):
-            here = one.part == part
+        for cycle in range(one.count):
+            here = one.cycle == cycle
             normal, moved = self.products.copy(), np.zeros(self.products.shape[0])
             normal[np.ix_(places, places)] -= columns[here].T @ columns[here]
             moved[places] = columns[here].T @ one.error[here]

@@ -11,7 +11,7 @@ from ...data.dataset import Dataset
 from ...errors import ParameterError
 from ..fitted.identified_model import IdentifiedModel
 from .estimate import covariance_of
-from .sensitivity import fitted_values, moved
+from .sensitivity import fitted_values, moved, sizes_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,7 +88,7 @@ def posterior_models(
     if len(data.t) < FEWEST:
         raise ParameterError("data", f"{len(data.t)} samples", f"{FEWEST} or more", verb="has")
     covariance = covariance_of(model, [(data, 1.0)], noise="residual")
-    sizes = np.array([abs(value.of(model)) or data.dt for value in values])
+    sizes = sizes_of(model, values, data.dt)
     axes = _axes(covariance, sizes)
     models = []
     for axis in axes:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from ..fitted.certainty.covariance import Covariance
+    from .sensitivity import Sensitivity
 
     Array = NDArray[np.float64]
 
@@ -70,24 +71,33 @@ def prediction_band(
     expect("model", model, IdentifiedModel, "a pt.IdentifiedModel")
     normal = normal_reach(level)
     pairs = _records(model, records)
-    errors = held_out(model, pairs)
+    values = fitted_values(model)
+    linear = [
+        sensitivity(model, data, values) if values and model._fitted_share(data) > 0.0 else None
+        for data, _ in pairs
+    ]
+    errors = held_out(model, pairs, linear)
     covariance = model.covariance
-    if covariance is None and fitted_values(model):
+    if covariance is None and values:
         covariance = covariance_of(model, pairs)
-    of = _of_record(model, u) if isinstance(u, Dataset) else _of_drive(model, u, dt)
+    if isinstance(u, Dataset):
+        known = [at for (data, _), at in zip(pairs, linear, strict=True) if data is u and at]
+        of = _of_record(model, u, known[0] if known else sensitivity(model, u, values))
+    else:
+        of = _of_drive(model, u, dt)
     rate = np.abs(np.gradient(of.u, of.t))
-    parts = errors.at(amplitudes(of.u), rate, level, _noise(model, pairs))
+    widths = errors.at(amplitudes(of.u), rate, level, _noise(model, pairs))
     reach = 0.0 if covariance is None else normal * _deviations(covariance, of.columns)
     return PredictionBand(
         t=of.t,
         u=of.u,
         x=of.x,
         level=float(level),
-        noise=parts.noise,
+        noise=widths.noise,
         parameters=np.broadcast_to(reach, of.x.shape),
-        model_error=parts.model_error,
-        unlike=parts.unlike,
-        cycles=errors.parts,
+        model_error=widths.model_error,
+        unlike=widths.unlike,
+        cycles=errors.cycles(),
         measured=of.measured,
         drive_unit=model.drive_unit,
     )
@@ -148,10 +158,9 @@ def _of_drive(model: IdentifiedModel, u: ArrayLike, dt: float | None) -> _Motion
     )
 
 
-def _of_record(model: IdentifiedModel, data: Dataset) -> _Motion:
+def _of_record(model: IdentifiedModel, data: Dataset, linear: Sensitivity) -> _Motion:
     """Motion on a record, whose offset and drift follow from its readings."""
     data = data.without_far_readings()
-    linear = sensitivity(model, data, fitted_values(model))
     basis = linear.nuisance.T
     columns = linear.columns.T
     columns = columns - basis @ np.linalg.lstsq(basis, columns, rcond=1e-12)[0]
@@ -171,11 +180,9 @@ def _deviations(covariance: Covariance, columns: Array) -> Array:
 
     In the directions that have no effect on the records a value is known to within its own size.
     """
-    spread = np.outer(covariance.widening, covariance.widening) * covariance.matrix
-    variance = np.sum(columns * (spread @ columns), axis=0)
-    variance += np.sum((covariance.hidden @ columns) ** 2, axis=0)
-    step = covariance.to_least_cost @ columns
-    return np.asarray(np.sqrt(np.maximum(variance, 0.0)) + np.abs(step))
+    unknown = np.sum((covariance.hidden @ columns) ** 2, axis=0)
+    spread = np.sqrt(covariance.spread(columns) ** 2 + unknown)
+    return np.asarray(spread + np.abs(covariance.to_least_cost @ columns))
 
 
 def _noise(model: IdentifiedModel, pairs: list[tuple[Dataset, float]]) -> float:

@@ -33,6 +33,7 @@ __all__ = [
     "gradient",
     "moved",
     "sensitivity",
+    "sizes_of",
 ]
 
 # Share of a value by which it is moved to see its effect.
@@ -146,6 +147,26 @@ def free_values(stage: Any, free: Collection[str]) -> list[Value]:
         elif value != 0.0:
             values.append(Value(name))
     return values
+
+
+def sizes_of(model: IdentifiedModel, values: list[Value], dt: float) -> Array:
+    """Return the sizes of values, to count changes in shares of them.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+    values : list of Value
+        Its values.
+    dt : float
+        Size of a delay of 0 [s].
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        SI, above 0.
+    """
+    return np.array([abs(value.of(model)) or dt for value in values], dtype=np.float64)
 
 
 def gradient(model: IdentifiedModel, quantity: Callable[[IdentifiedModel], float]) -> Array:

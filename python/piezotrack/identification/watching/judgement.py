@@ -169,9 +169,7 @@ class Judgement:
         scale = np.linalg.norm(whole, axis=0)
         scale[scale == 0.0] = 1.0
         changes = self._effects @ (np.linalg.pinv(whole / scale, rcond=1e-12).T / scale)[:, 1:]
-        # As its intervals are, wider than those of normal deviations.
-        sizes = covariance.widening[:, None] * changes
-        return np.asarray(np.sqrt(np.maximum(np.sum(sizes * (covariance.matrix @ sizes), 0), 0.0)))
+        return covariance.spread(changes)
 
     @cached_property
     def _effects(self) -> Array:

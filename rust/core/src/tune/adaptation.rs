@@ -1,7 +1,7 @@
 //! A search about a place that adapts to the shape of the valley: CMA-ES.
 //!
 //! Hansen, The CMA Evolution Strategy: A Tutorial, 2016, arXiv 1604.00772, equations (38) to (53).
-//! What is beyond an end of the unit box is reflected.
+//! Places beyond an end of the unit box are reflected.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -32,7 +32,7 @@ pub(super) struct Adaptation {
     widths: DVector<f64>,
     path: DVector<f64>,
     step_path: DVector<f64>,
-    asked: Vec<Vec<f64>>,
+    pending: Vec<Vec<f64>>,
     /// Best rank after each generation.
     history: Vec<f64>,
 }
@@ -54,16 +54,16 @@ impl Adaptation {
             widths: DVector::from_element(n, 1.0),
             path: DVector::zeros(n),
             step_path: DVector::zeros(n),
-            asked: Vec::new(),
+            pending: Vec::new(),
             history: Vec::new(),
         };
-        out.asked = out.drawn();
+        out.pending = out.drawn();
         out
     }
 
     /// The places whose ranks it needs now.
-    pub(super) fn asked(&self) -> impl Iterator<Item = &Vec<f64>> {
-        self.asked.iter()
+    pub(super) fn pending(&self) -> impl Iterator<Item = &Vec<f64>> {
+        self.pending.iter()
     }
 
     /// Candidates so far.
@@ -101,17 +101,17 @@ impl Adaptation {
             .collect()
     }
 
-    /// Takes the ranks of the places that it asked for, in their order.
+    /// Takes the ranks of the places that were pending, in their order.
     pub(super) fn tell(&mut self, ranks: &[f64]) {
         let n = index(self.mean.len());
-        let mut order: Vec<usize> = (0..self.asked.len()).collect();
+        let mut order: Vec<usize> = (0..self.pending.len()).collect();
         order.sort_by(|a, b| ranks[*a].total_cmp(&ranks[*b]));
-        self.evaluated += self.asked.len();
+        self.evaluated += self.pending.len();
         let best = ranks[order[0]];
         self.history.push(self.history.last().map_or(best, |last| last.min(best)));
-        let parents = self.asked.len() / 2;
-        let half = libm::log(0.5 * (index(self.asked.len()) + 1.0));
-        let raw: Vec<f64> = (1..=self.asked.len()).map(|i| half - libm::log(index(i))).collect();
+        let parents = self.pending.len() / 2;
+        let half = libm::log(0.5 * (index(self.pending.len()) + 1.0));
+        let raw: Vec<f64> = (1..=self.pending.len()).map(|i| half - libm::log(index(i))).collect();
         let (good, bad) = raw.split_at(parents);
         let total: f64 = good.iter().sum();
         let effective = total * total / good.iter().map(|one| one * one).sum::<f64>();
@@ -136,7 +136,7 @@ impl Adaptation {
             .collect();
         let ways: Vec<DVector<f64>> = order
             .iter()
-            .map(|i| (DVector::from_column_slice(&self.asked[*i]) - &self.mean) / self.step)
+            .map(|i| (DVector::from_column_slice(&self.pending[*i]) - &self.mean) / self.step)
             .collect();
         let mut way = DVector::zeros(self.mean.len());
         for (weight, one) in weights[..parents].iter().zip(&ways) {
@@ -175,7 +175,7 @@ impl Adaptation {
         let parts = SymmetricEigen::new(self.covariance.clone());
         self.widths = parts.eigenvalues.map(|one| libm::sqrt(one.max(1e-20)));
         self.basis = parts.eigenvectors;
-        self.asked = self.drawn();
+        self.pending = self.drawn();
     }
 }
 

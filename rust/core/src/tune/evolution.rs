@@ -78,7 +78,7 @@ impl Evolution {
     }
 
     /// The places whose ranks it needs now.
-    pub(super) fn asked(&self) -> impl Iterator<Item = &Vec<f64>> {
+    pub(super) fn pending(&self) -> impl Iterator<Item = &Vec<f64>> {
         self.trials.iter().map(|trial| &trial.place)
     }
 
@@ -87,7 +87,7 @@ impl Evolution {
         self.evaluated >= self.budget
     }
 
-    /// Takes the ranks of the places that it asked for, in their order.
+    /// Takes the ranks of the places that were pending, in their order.
     pub(super) fn tell(&mut self, ranks: &[f64]) {
         let trials = core::mem::take(&mut self.trials);
         self.evaluated += trials.len();

@@ -111,7 +111,7 @@ struct Tried {
 }
 
 impl Tried {
-    /// Rank that the swarm makes small: any that keeps what is required comes before any that does
+    /// Rank that a search makes small: any that keeps what is required comes before any that does
     /// not, and one that keeps the margins before one that does not.
     fn rank(&self) -> f64 {
         let rank = match (self.excess <= 1.0, self.figures.is_empty()) {
@@ -186,10 +186,10 @@ struct Run {
 }
 
 impl Run {
-    fn asked(&self) -> Vec<Vec<f64>> {
+    fn pending(&self) -> Vec<Vec<f64>> {
         match &self.phase {
-            Phase::Evolving(one) => one.asked().cloned().collect(),
-            Phase::Refining(one) => one.asked().cloned().collect(),
+            Phase::Evolving(one) => one.pending().cloned().collect(),
+            Phase::Refining(one) => one.pending().cloned().collect(),
             Phase::Ended => Vec::new(),
         }
     }
@@ -263,8 +263,8 @@ impl Tuning<'_> {
             let numbered = sides.iter().zip(runs.len() as u64..);
             runs.extend(numbered.map(|(side, run)| self.run(*side, run, times)));
             loop {
-                let asked: Vec<Vec<Vec<f64>>> = runs.iter().map(Run::asked).collect();
-                let places: Vec<&Vec<f64>> = asked.iter().flatten().collect();
+                let pending: Vec<Vec<Vec<f64>>> = runs.iter().map(Run::pending).collect();
+                let places: Vec<&Vec<f64>> = pending.iter().flatten().collect();
                 if places.is_empty() || stop() {
                     break;
                 }
@@ -272,7 +272,7 @@ impl Tuning<'_> {
                 counts.0 += tried.len();
                 counts.1 += tried.iter().map(|one| one.figures.len()).sum::<usize>();
                 let mut rest = tried.as_slice();
-                for (run, places) in runs.iter_mut().zip(&asked).filter(|(_, it)| !it.is_empty()) {
+                for (run, places) in runs.iter_mut().zip(&pending).filter(|(_, it)| !it.is_empty()) {
                     let (own, others) = rest.split_at_checked(places.len()).unwrap_or_default();
                     rest = others;
                     run.tell(places, own);

@@ -268,6 +268,22 @@ class Covariance:
         deviation = math.sqrt(max(float(gradient @ self.matrix @ gradient), 0.0))
         return normal * widening * deviation + abs(float(gradient @ self.to_least_cost))
 
+    def spread(self, gradients: Array) -> Array:
+        """Return standard deviations of quantities, as much wider as intervals of the values are.
+
+        Parameters
+        ----------
+        gradients : ndarray, shape (p, m)
+            Change of each quantity with each value.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+            In the units of the quantities, without what the records do not determine.
+        """
+        wide = self.widening[:, None] * gradients
+        return np.asarray(np.sqrt(np.maximum(np.sum(wide * (self.matrix @ wide), axis=0), 0.0)))
+
     def _place(self, name: str) -> int:
         if name not in self.names:
             raise ParameterError("name", quoted(name), f"one of {', '.join(self.names)}")
