@@ -13,13 +13,13 @@ import pytest
 
 import piezotrack as pt
 from piezotrack._support.files.writing import save_figures
+from piezotrack.identification.views.files import save_identification
 from piezotrack.identification.views.plot import (
     plot_convergence,
     plot_loop,
     plot_response,
     plot_time,
 )
-from piezotrack.identification.views.report import save_identification
 from records import quick, quick_fit, search_of
 
 if TYPE_CHECKING:

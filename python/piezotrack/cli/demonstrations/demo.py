@@ -46,8 +46,8 @@ def _measured(result: Output, seed: int) -> None:
     """Run the demonstration on the two measured logs of the package."""
     from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
     from ...data.log_file import write_log
+    from ...identification.views.files import identification_files, save_identification
     from ...identification.views.plot import band_of, plot_loop, plot_time, what_was_shown
-    from ...identification.views.report import identification_files, save_identification
     from .demonstration import run_demo
     from .loop_plot import plot_before_and_after
 
@@ -114,7 +114,7 @@ def _paper(result: Output, seed: int) -> None:
     """Run the demonstration of the paper: its stage, simulated, and its model."""
     from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
     from ...data.log_file import write_log
-    from ...identification.views.report import identification_files, save_identification
+    from ...identification.views.files import identification_files, save_identification
     from ...xu_li_2010.demo import demo_log, identify_demo, track_demo
 
     tracked = picture_files(*(f"track_{name}" for name in RUNS))

@@ -175,7 +175,7 @@ def _files(
     """Names of all files that the command may write."""
     from ..._support.files.writing import picture_files
     from ...identification.solve.selection import models_tried
-    from ...identification.views.report import identification_files
+    from ...identification.views.files import identification_files
 
     names = [name for name in kinds.names if name != AUTO]
     if AUTO in kinds.names:
@@ -228,8 +228,8 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
 def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]:
     """Write the model and the pictures, those of a second log too."""
     from ..._support.files.writing import make_folder, result_set, save_figures
+    from ...identification.views.files import save_identification
     from ...identification.views.plot import band_of, plot_loop, plot_time, what_was_shown
-    from ...identification.views.report import save_identification
 
     name = fit.model.info.name
     figures = {}

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ... import _core
 from ..._support.arguments import expect
 from ..._support.arrays import LARGEST, check_dt, signal_of
-from ..._support.display.result import Result
 from ..._support.files.writing import write_document
 from ...data.checks.fast_drive import CURVED, is_fast
 from ...data.dataset import Dataset
@@ -30,25 +29,22 @@ from .model_entries import (
     parameter_entries,
     sensor_number,
 )
+from .model_views import ModelViews
 from .notes import extrapolation_notes
 from .score import Score
 from .start import begin, checked_history, same_beginning, start_entry
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
     from pathlib import Path
 
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike, NDArray
 
     from ...data.dataset import Hold
     from ...stages.inverse import Inverse
     from ...stages.motion import Response, StageState
-    from .certainty.confidence import Confidence
     from .certainty.covariance import Covariance
-    from .certainty.prediction_band import PredictionBand
     from .drift import Drift
     from .fitted_record import FittedRecord
     from .start import History, Start
@@ -62,7 +58,7 @@ EXPLAINED = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class IdentifiedModel(Result):
+class IdentifiedModel(ModelViews):
     """An identified stage, with the offset and delay of its sensor.
 
     Attributes
@@ -99,15 +95,6 @@ class IdentifiedModel(Result):
     details : mapping
         Other entries of the model file: fit, provenance.
     """
-
-    views: ClassVar[Mapping[str, str]] = {
-        "summary": "identification.views.report:model_text",
-        "plot": "identification.views.plot:plot_model",
-        "loop": "identification.views.plot:plot_model_loop",
-        "time": "identification.views.plot:plot_model_time",
-        "confidence": "identification.confidence.intervals.intervals_of:intervals_of",
-        "band": "identification.confidence.prediction_band:prediction_band",
-    }
 
     # A stage of any model: each has its own parameters.
     model: Any
@@ -545,191 +532,6 @@ class IdentifiedModel(Result):
                 raise ParameterError("offset", shift, f"'own', or m below {LARGEST:g}")
             return shift
         return float(np.mean(data.counted(data.y - x))) if self._fits_offset(data) else 0.0
-
-    def confidence(
-        self, level: float = 0.95, *, method: Literal["profile", "bootstrap"] = "profile"
-    ) -> Confidence:
-        """Return intervals of confidence that hold where the cost is not quadratic too.
-
-        `Identification.covariance`, which every fit has, is exact for small deviations. A profile
-        shows whether the records limit a parameter at all, and on which side. Refits check both:
-        they take the model and the resampled noise for true.
-
-        Parameters
-        ----------
-        level : float, optional
-            Between 0 and 1.
-        method : {"profile", "bootstrap"}, optional
-            Profiles of the cost, or 200 refits of resampled noise, the same in every call.
-
-        Returns
-        -------
-        Confidence
-            The intervals, with a lower minimum where a profile met one.
-
-        Raises
-        ------
-        ParameterError
-            `level` or `method` is none of these, the model was read from a file and has no record,
-            or its parameters were not searched.
-        DataError
-            The record is too short.
-        NumericalError
-            The fit leaves no residual.
-
-        Examples
-        --------
-        >>> import piezotrack as pt
-        >>> log = pt.datasets.dbo_training()[3.0:8.0]
-        >>> fit = pt.identify(log, "first-order-dahl", method=pt.Descents(seed=1))
-        >>> fit.confidence(0.68).parameters["piezo_coefficient"].shape
-        'bounded'
-        """
-        intervals: Confidence = self.view("confidence")(self, level, method)
-        return intervals
-
-    def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
-        """Loop, displacement with its error over time, and convergence of a search.
-
-        Of several records loop and displacement of each, one below the other.
-
-        Parameters
-        ----------
-        data : Dataset, optional
-            Record on which the model is shown; that of the fit where not given. A model from a file
-            has none.
-        fig : matplotlib.figure.Figure or SubFigure, optional
-            Where to draw; a new figure of pyplot where not given.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-            The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
-
-        Raises
-        ------
-        ParameterError
-            There is no record.
-        """
-        figure: Figure = self.view("plot")(self, data, fig)
-        return figure
-
-    def plot_loop(self, data: Dataset | None = None, *, ax: Axes | None = None) -> Axes:
-        """Draw the hysteresis loop: displacement over drive, measured and simulated.
-
-        Parameters
-        ----------
-        data : Dataset, optional
-            As of `plot`.
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; a new figure where not given.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes drawn on.
-
-        Raises
-        ------
-        ParameterError
-            There is no record.
-
-        Examples
-        --------
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> log = pt.datasets.dbo_training()[3.0:8.0]
-        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
-        >>> ax = fit.plot_loop(ax=Figure().subplots())
-        >>> ax.get_xlabel(), ax.get_ylabel()
-        ('drive [V]', 'displacement [um]')
-        """
-        drawn: Axes = self.view("loop")(self, data, ax)
-        return drawn
-
-    def plot_time(
-        self, data: Dataset | None = None, *, axes: Sequence[Axes] | None = None
-    ) -> tuple[Axes, Axes]:
-        """Draw measured and simulated displacement over time, and the error below.
-
-        Parameters
-        ----------
-        data : Dataset, optional
-            As of `plot`.
-        axes : two matplotlib.axes.Axes, optional
-            Where to draw; a new figure where not given.
-
-        Returns
-        -------
-        tuple of two matplotlib.axes.Axes
-            Displacement, error.
-
-        Raises
-        ------
-        ParameterError
-            There is no record.
-
-        Examples
-        --------
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> log = pt.datasets.dbo_training()[3.0:8.0]
-        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
-        >>> above, below = fit.plot_time(axes=Figure().subplots(2, 1))
-        >>> below.get_ylabel()
-        'error [nm]'
-        """
-        drawn: tuple[Axes, Axes] = self.view("time")(self, data, axes)
-        return drawn
-
-    def prediction_band(
-        self,
-        u: ArrayLike | Dataset,
-        dt: float | None = None,
-        *,
-        level: float = 0.95,
-        records: Sequence[Dataset] | None = None,
-    ) -> PredictionBand:
-        """Predict the displacement under a drive, with a band in which a reading is expected.
-
-        Noise of the sensor, parameters and error of the model are kept apart; see `PredictionBand`.
-
-        Parameters
-        ----------
-        u : array_like, shape (n,), or Dataset
-            The drive [V], from rest, as that of an inverse; or a record, whose offset, drift and
-            beginning follow from its readings.
-        dt : float, optional
-            Sampling interval [s], of a drive that is no record.
-        level : float, optional
-            Probability with which a reading is in the band.
-        records : sequence of Dataset, optional
-            Records on which the errors are found, at best some that were not fitted; those of the
-            fit where not given. A model from a file has none.
-
-        Returns
-        -------
-        PredictionBand
-            The displacement and its band.
-
-        Raises
-        ------
-        ParameterError
-            `level` is not between 0 and 1, there is no record, or its drive has another unit.
-        ShapeError, DataError
-            `u` is no drive, or has fewer than 8 samples.
-
-        Examples
-        --------
-        >>> import piezotrack as pt
-        >>> log = pt.datasets.dbo_training()[3.0:13.0]
-        >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
-        >>> band = fit.prediction_band(log.u - log.u[0], log.dt)
-        >>> bool(band.noise.max() < band.half.max() < 0.5e-6)
-        True
-        """
-        predicted: PredictionBand = self.view("band")(self, u, dt, level=level, records=records)
-        return predicted
 
     def document(self) -> dict[str, Any]:
         """Content of the JSON file.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
 from ..._support.units import length_text, of_drive, shown_unit
 from ..fitted.start import GAIN
 from ..methods.descents import Descents
@@ -15,9 +14,6 @@ from .confidence.residual_report import fit_notes
 from .quantities import errors_of, errors_of_file, of_sensor, of_stage, predicted, rows
 
 if TYPE_CHECKING:
-    import os
-    from pathlib import Path
-
     from ...data.dataset import Dataset
     from ..fitted.estimates import Estimate, SearchRun
     from ..fitted.identification import Identification
@@ -25,11 +21,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "determined",
-    "identification_files",
     "list_sentences",
     "model_text",
     "parameter_notes",
-    "save_identification",
     "search_sentences",
     "summary_text",
     "verdict_sentences",
@@ -420,84 +414,3 @@ def _row(fit: Identification, name: str, estimate: Estimate, width: int) -> str:
     return (
         f"  {name:<18}{estimate.symbol:<{width}}{estimate.value:>13.6g}  {estimate.unit:<9}{note}"
     ).rstrip()
-
-
-def identification_files(name: str, *, searched: bool, records: int = 1) -> list[str]:
-    """Return the names of the files that `save_identification` writes.
-
-    Parameters
-    ----------
-    name : str
-        Beginning of the file names.
-    searched : bool
-        Whether the model is searched.
-    records : int, optional
-        Number of records.
-
-    Returns
-    -------
-    list of str
-        The model and its pictures.
-    """
-    pictures = [f"{panel}{_nth(i)}" for i in range(records) for panel in ("loop", "time")]
-    pictures += ["convergence"] if searched else []
-    return [f"{name}.json", *picture_files(*(f"{name}_{picture}" for picture in pictures))]
-
-
-def _nth(i: int) -> str:
-    """End of the names of a record's pictures: nothing for the first."""
-    return f"_{i + 1}" if i else ""
-
-
-def save_identification(
-    fit: Identification,
-    folder: str | os.PathLike[str],
-    *,
-    name: str | None = None,
-    shown: Dataset | None = None,
-) -> list[Path]:
-    """Write the model and its pictures.
-
-    Parameters
-    ----------
-    fit : Identification
-        Result of an identification.
-    folder : path-like
-        Folder to write to; created if it does not exist.
-    name : str, optional
-        Beginning of the file names; by default the name of the model.
-    shown : Dataset, optional
-        A longer record that the pictures show, with the end of the fit marked; of a fit of one
-        record.
-
-    Returns
-    -------
-    list of pathlib.Path
-        ``{name}.json``, and as PNG and SVG ``{name}_loop``, ``{name}_time`` and, after a
-        search, ``{name}_convergence``; of a second record ``{name}_loop_2`` and ``{name}_time_2``.
-    """
-    from .plot import band_of, named, plot_convergence, plot_loop, plot_time, what_was_fitted
-
-    name = fit.model.info.name if name is None else name
-    until = None if shown is None else float(fit.data.t[-1])
-    figures = {}
-    for i, record in enumerate(fit.records):
-        data = record.data if shown is None else shown
-        if data is None:
-            continue
-        run = fit.simulate(data, offset=record.offset)
-        title = what_was_fitted(fit, record)
-        above, _ = plot_time(
-            data,
-            run,
-            stroke=record.stroke,
-            fitted_until=until,
-            half=band_of(fit, data),
-            title=title,
-        )
-        figures[f"{name}_loop{_nth(i)}"] = plot_loop(data, run, title=title).figure
-        figures[f"{name}_time{_nth(i)}"] = above.figure
-    if fit.model.info.searched:
-        figures[f"{name}_convergence"] = plot_convergence(fit, title=named(fit, fit.data)).figure
-    with result_set(make_folder(folder)) as path:
-        return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]
