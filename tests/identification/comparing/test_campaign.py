@@ -11,8 +11,7 @@ import sys
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -21,9 +20,13 @@ from matplotlib.figure import Figure
 
 import piezotrack as pt
 from campaigns import PLAYS, QUICK, Serial, contents, flat, log, results
+from folders import ROOT
 from piezotrack.identification.campaigns import task as campaign_task
 from piezotrack.identification.campaigns.campaign import campaign
 from piezotrack.identification.campaigns.task import Task, problem_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def run(
@@ -218,7 +221,7 @@ try:
 except pt.Interrupted as error:
     print(error)
 """
-    helpers = Path(__file__).parents[1] / "helpers"
+    helpers = ROOT / "tests" / "helpers"
     ended = subprocess.run(
         [sys.executable, "-c", code, str(helpers)],
         capture_output=True,
@@ -309,7 +312,7 @@ def test_the_name_of_a_task_is_the_same_in_another_process() -> None:
         "problem, methods = problem_of('dahl', given, log()); "
         "print(Task(problem=problem, methods=methods, seed=3).name)"
     )
-    helpers = str(Path(__file__).parents[1] / "helpers")
+    helpers = str(ROOT / "tests" / "helpers")
     done = subprocess.run(
         [sys.executable, "-c", code, helpers], capture_output=True, text=True, check=True
     )

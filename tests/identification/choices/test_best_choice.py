@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-BENCH = Path(__file__).parents[2] / "benches" / "records" / "choices.py"
+from folders import ROOT
+
+BENCH = ROOT / "benches" / "records" / "choices.py"
 
 
 def bench() -> Any:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import piezotrack as pt
+from folders import ROOT
 
-BENCH = Path(__file__).parents[2] / "benches" / "coverage"
+BENCH = ROOT / "benches" / "coverage"
 # Goal of every cell, records of each, and their binomial error, twice.
 LEAST, MOST, RECORDS = 0.92, 0.98, 60
 ERROR = 2.0 * np.sqrt(0.95 * 0.05 / RECORDS)
