@@ -180,6 +180,8 @@ def test_a_band_is_refused_in_a_sentence() -> None:
             fit.prediction_band(drive(1), DT, level=level)
     with pytest.raises(pt.ParameterError, match="a drive in N: expected one in V"):
         fit.prediction_band(drive(1), DT, records=[newtons])
+    with pytest.raises(pt.ParameterError, match="records is one Dataset: expected a list"):
+        fit.prediction_band(drive(1), DT, records=record(1))  # type: ignore[arg-type]
     with pytest.raises(pt.ParameterError, match="records is an empty list"):
         fit.prediction_band(drive(1), DT, records=[])
     with pytest.raises(pt.ParameterError, match="dt is None: expected the sampling interval"):

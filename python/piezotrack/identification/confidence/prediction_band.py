@@ -124,6 +124,8 @@ def _records(
                 "records", "none", "records of the stage, as a model from a file has none"
             )
         return pairs
+    if isinstance(records, Dataset):
+        raise ParameterError("records", "one Dataset", "a list of records, as [log]")
     for i, one in enumerate(records):
         expect(f"records[{i}]", one, Dataset, "a Dataset")
         if one.drive_unit != model.drive_unit:
