@@ -272,7 +272,8 @@ impl Tuning<'_> {
                 counts.0 += tried.len();
                 counts.1 += tried.iter().map(|one| one.figures.len()).sum::<usize>();
                 let mut rest = tried.as_slice();
-                for (run, places) in runs.iter_mut().zip(&pending).filter(|(_, it)| !it.is_empty()) {
+                for (run, places) in runs.iter_mut().zip(&pending).filter(|(_, it)| !it.is_empty())
+                {
                     let (own, others) = rest.split_at_checked(places.len()).unwrap_or_default();
                     rest = others;
                     run.tell(places, own);
