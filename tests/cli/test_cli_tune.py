@@ -57,7 +57,8 @@ def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> Non
     assert [one["name"] for one in loaded.provenance["design"]["kept"]]
     document = report()
     assert document["format"] == "piezotrack-tuning"
-    assert [one["kind"] for one in document["filters"]] == ["LowPass"]
+    # A low-pass that costs more than it saves is left out.
+    assert {one["kind"] for one in document["filters"]} <= {"LowPass"}
     known = pt.load("dahl.json")
     loop = controller(document, feedforward=known.inverse())
     # The loop that a person makes of the file, judged without the tuning.
