@@ -40,7 +40,7 @@ def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
             "identification.comparison.compare",
             "identification.experiments.sensor_noise",
             "identification.experiments.step_response",
-            "identification.views.report",
+            "identification.views.files",
         )
     ]
 

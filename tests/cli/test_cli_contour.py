@@ -70,6 +70,27 @@ def test_two_models_are_the_two_axes() -> None:
 
 
 @pytest.mark.usefixtures("_no_pictures")
+def test_other_models_are_the_stage_of_both_axes() -> None:
+    known = pt.load("dahl.json")
+    for name, factor in (("x", 1.1), ("y", 0.9)):
+        stage = replace(known.model, piezo_coefficient=factor * known.model.piezo_coefficient)
+        replace(known, model=stage).save(f"{name}.json")
+    course = ("--path", "circle:1Hz,10um,4s", "--dt", "0.002", "--stage", "x.json")
+    printed = ran("contour", "dahl.json", *course, "--stage", "y.json")
+    assert printed.startswith("stage: x.json and y.json: ")
+    rows = table("results/contour.csv")
+    late = rows["time_s"] > 1.999
+    for axis, factor in (("x", 1.1), ("y", 0.9)):
+        # The inverse of the model, on a stage of another gain.
+        moved = np.ptp(rows[f"measured_{axis}_um"][late])
+        assert moved == pytest.approx(factor * 20.0, rel=0.05)
+    ran("contour", "dahl.json", *course, "--overwrite")
+    rows = table("results/contour.csv")
+    both = [np.ptp(rows[f"measured_{axis}_um"][rows["time_s"] > 1.999]) for axis in "xy"]
+    assert both[0] == pytest.approx(both[1], rel=1e-3)
+
+
+@pytest.mark.usefixtures("_no_pictures")
 def test_each_axis_may_have_its_own_gain() -> None:
     """One falls as the voltage rises: no gain is right for both."""
     stage = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(), weights=(), time_constant=5e-3)
@@ -187,8 +208,11 @@ def test_what_cannot_be_done_is_refused_in_one_sentence() -> None:
     assert "expected one model file with --stage xu-li-2010" in refusal(
         "contour", "dahl.json", "dahl.json", "--path", "circle:0.1Hz,1um", *PAPER
     )
-    assert "--stage is model without a model file" in refusal(
-        "contour", "--path", "circle:0.1Hz,1um", "--stage", "model"
+    assert "--stage is dahl.json without MODEL_X" in refusal(
+        "contour", "--path", "circle:0.1Hz,1um", "--stage", "dahl.json"
+    )
+    assert "expected one model file, or that of x and of y, or xu-li-2010" in refusal(
+        "contour", "dahl.json", "--path", "circle:0.1Hz,1um", *PAPER, "--stage", "dahl.json"
     )
     Path("still.csv").write_text(
         "time_s,x_um\n" + "\n".join(f"{k / 100},1.0" for k in range(200)), encoding="utf-8"

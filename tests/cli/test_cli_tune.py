@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -107,7 +108,7 @@ def test_spreads_add_plants_and_margins_in_degrees_are_kept() -> None:
     document = report()
     assert len(document["plants"]) == 3 * 2 * 3 * 3
     kept = {one["name"]: one for one in document["kept"]}
-    assert kept["phase margin"]["bound"] == pytest.approx(math.pi / 3.0)
+    assert kept["phase_margin_deg"]["bound"] == pytest.approx(60.0)
     late = pt.check_loop(pt.load("dahl.json"), controller(document), delay=0.002).high
     # 20 % more gain still has a gain margin of 2.
     assert (late.gain_margin or math.inf) / 1.2 >= 2.0 * 0.99
@@ -135,6 +136,30 @@ def test_the_calmest_command_within_an_allowed_error() -> None:
 
 
 @pytest.mark.usefixtures("_no_pictures")
+def test_another_stage_is_tuned_for_with_the_margins_of_both() -> None:
+    known = pt.load("dahl.json")
+    stage = replace(known.model, piezo_coefficient=1.3 * known.model.piezo_coefficient)
+    replace(known, model=stage).save("other.json")
+    printed = ran("tune", "dahl.json", *COURSE, *QUICK, "--stage", "other.json")
+    assert printed.startswith("stage: other.json\n")
+    document = report()
+    assert len(document["plants"]) == 6
+    loop = controller(document, feedforward=known.inverse())
+    for model in (known, pt.load("other.json")):
+        assert pt.check_loop(model, loop).high.sensitivity <= 2.0 * 1.01
+    run = pt.track(pt.load("other.json"), loop, pt.sine(
+        frequency=0.5, low=10e-6, high=60e-6, duration=6.0
+    ))  # fmt: skip
+    (written,) = document["references"]
+    assert written["metrics"]["rms_error"] == pytest.approx(run.metrics.rms_error, rel=1e-9)
+    # What was tuned is what `track` simulates.
+    course = ("track", "results/controller.json", *COURSE, "--stage", "other.json")
+    again = parsed(ran(*course, "--out", "again", "--json"))
+    assert again["metrics"]["rms_error"] == written["metrics"]["rms_error"]
+    assert again["true_metrics"] == written["true_metrics"]
+
+
+@pytest.mark.usefixtures("_no_pictures")
 def test_the_same_command_writes_the_same_bytes() -> None:
     for folder in ("one", "two"):
         ran("tune", "dahl.json", *COURSE, *QUICK, "--out", folder)
@@ -149,7 +174,7 @@ def test_the_same_command_writes_the_same_bytes() -> None:
         ("--figure effort", "--figure is effort without --allowed-um: expected the largest"),
         ("--figure effort --allowed-um 0", "--allowed-um is 0: expected an error above 0 um"),
         ("--allowed-um 1e-6", "--allowed-um is 1e-06 um without a reference: expected one"),
-        ("--gain-margin 1", "--gain-margin is 1: expected a factor above 1"),
+        ("--gain-margin 0", "--gain-margin is 0: expected dB, above 0 and below 400"),
         ("--phase-margin 180", "--phase-margin is 180: expected degrees, 0 to below 180"),
         ("--sensitivity nan", "--sensitivity is nan: expected a factor above 1"),
         ("--mode-spread 99", "--mode-spread is 99: expected per cent, 0 to below 95"),
@@ -178,14 +203,14 @@ def test_margins_out_of_reach_are_refused() -> None:
 @pytest.mark.usefixtures("_no_pictures")
 def test_a_gain_margin_out_of_reach_is_named_with_the_nearest() -> None:
     """The search itself ranks unstable gains before those that are short by so much."""
-    message = refusal("tune", "dahl.json", *QUICK, "--gain-margin", "1e9")
-    assert message.startswith("--gain-margin is 1e+09: expected one that some gains can keep")
-    (nearest,) = re.findall(r"the nearest have ([0-9.e+]+) \(", message)
-    (factor,) = re.findall(r", ([0-9.e+]+) times too low$", message)
-    assert float(nearest) * float(factor) == pytest.approx(1e9, rel=1e-3)
+    message = refusal("tune", "dahl.json", *QUICK, "--gain-margin", "180")
+    assert message.startswith("--gain-margin is 180 dB, a factor of 1e+09: expected one that some")
+    (nearest,) = re.findall(r"the nearest have ([0-9.]+) dB \(", message)
+    (less,) = re.findall(r", ([0-9.]+) dB too low$", message)
+    assert float(nearest) + float(less) == pytest.approx(180.0, rel=1e-3)
     # What is said to be nearest can be kept, and not much more.
-    ran("tune", "dahl.json", *QUICK, "--gain-margin", f"{0.9 * float(nearest)}")
-    more = ("--gain-margin", f"{1.5 * float(nearest)}", "--overwrite")
+    ran("tune", "dahl.json", *QUICK, "--gain-margin", f"{float(nearest) - 1.0}")
+    more = ("--gain-margin", f"{float(nearest) + 3.5}", "--overwrite")
     assert "expected one that" in refusal("tune", "dahl.json", *QUICK, *more)
 
 

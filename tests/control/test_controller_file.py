@@ -165,7 +165,9 @@ def test_margins_at_design_are_kept() -> None:
     assert other.provenance is not None
     design = other.provenance["design"]
     assert design["by"] == "check_loop"
-    assert design["high"]["gain_margin"] == report.high.gain_margin
+    assert 10.0 ** (design["high"]["gain_margin_dB"] / 20.0) == pytest.approx(
+        report.high.gain_margin
+    )
     assert design["low"]["plant_gain_m_per_V"] == report.low.gain
     assert other.provenance["version"] == pt.__version__
     # They go with the controller, but not with a changed one.
@@ -186,7 +188,10 @@ def test_what_a_search_kept_is_kept() -> None:
     other = pt.load_controller(tuned.controller.save("loop.json", report=tuned))
     assert other.provenance is not None
     kept = {one["name"]: one["value"] for one in other.provenance["design"]["kept"]}
-    assert kept["gain margin"] >= 2.0
+    factors = {one.name: one.value for one in tuned.kept}
+    assert kept["gain_margin_dB"] == pytest.approx(20.0 * math.log10(factors["gain margin"]))
+    assert kept["gain_margin_dB"] >= 6.02
+    assert kept["phase_margin_deg"] == pytest.approx(math.degrees(factors["phase margin"]))
     assert other == tuned.controller
 
 

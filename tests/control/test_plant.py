@@ -217,6 +217,22 @@ def test_the_time_constant_counts_as_a_lag() -> None:
     assert margin == pytest.approx((1.0 + pole) / (1.0 - pole), rel=1e-6)
 
 
+@pytest.mark.parametrize("share", [0.05, 0.5])
+def test_the_bandwidth_is_where_the_closed_loop_is_3_decibels_below_1(share: float) -> None:
+    """A PI law whose zero cancels a lag leaves T = g/(z - 1 + g)."""
+    dt, gain, time = 0.02, 1e-6, 0.05
+    lagging = pt.PrandtlIshlinskiiStage(linear=gain, thresholds=(), weights=(), time_constant=time)
+    pole = math.exp(-dt / time)
+    law = pt.Pid(kp=share * pole / (1.0 - pole) / gain, ti=dt * pole / (1.0 - pole))
+    cosine = (1.0 + (1.0 - share) ** 2 - 2.0 * share**2) / (2.0 * (1.0 - share))
+    expected = math.acos(cosine) / (2.0 * math.pi * dt)
+    found = pt.check_loop(lagging, loop(dt=dt, feedback=law)).middle
+    assert found.bandwidth == pytest.approx(expected, rel=1e-3)
+    assert found.margins()["bandwidth_Hz"] == found.bandwidth
+    # Without feedback there is none.
+    assert pt.check_loop(lagging, loop(dt=dt)).middle.bandwidth is None
+
+
 def test_a_repetitive_loop_prints_its_own_margin() -> None:
     """A feedback with a margin of 10 helps nothing where the learning is unstable."""
     feedback = pt.Pid(kp=0.05e6, ti=0.02, td=0.0)
@@ -231,7 +247,7 @@ def test_a_repetitive_loop_prints_its_own_margin() -> None:
     assert report.stable_gains is not None
     factor = report.stable_gains[1]
     assert factor < 1.0
-    assert str(report) == f"1.3 um/V: UNSTABLE, gain margin {factor:.3g}"
+    assert str(report) == f"1.3 um/V: UNSTABLE, gain margin {20.0 * np.log10(factor):.3g} dB"
     # At that gain the loop is at its limit.
     assert check(0.99 * factor * 1.3e-6).stable
     assert "Ms of the feedback" in str(check(0.99 * factor * 1.3e-6))

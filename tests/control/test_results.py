@@ -75,7 +75,9 @@ def test_a_report_has_its_margins_as_numbers_for_the_file_of_its_controller() ->
     loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
     report = pt.check_loop(pt.VirtualStage.xu_li_2010(), loop)
     design = plain(report.design())
-    assert design["middle"]["gain_margin"] == report.middle.gain_margin
+    assert 10.0 ** (design["middle"]["gain_margin_dB"] / 20.0) == pytest.approx(
+        report.middle.gain_margin
+    )
     assert plain(loop.document(report=report))["provenance"]["design"] == design
     assert plain(loop.document())["provenance"]["design"] is None
 

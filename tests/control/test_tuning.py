@@ -17,6 +17,7 @@ import pytest
 import piezotrack as pt
 from piezotrack.control import MarginReport
 from piezotrack.control.tuning import search
+from piezotrack.control.tuning.structures import gains_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -198,6 +199,44 @@ def test_gains_of_a_stage_that_falls_as_the_voltage_rises_are_negative() -> None
     assert max(one.share for one in tuned.kept) <= 1.01
 
 
+def test_margins_are_shown_in_decibels_and_degrees() -> None:
+    gain = MarginReport("gain margin", 4.0, 2.0, "low gain")
+    assert str(gain) == "gain margin 12 dB (at least 6.02 dB), low gain"
+    assert gain.entry()["value"] == pytest.approx(20.0 * math.log10(4.0))
+    phase = MarginReport("phase margin", math.pi / 3.0, 0.5, "low gain")
+    assert phase.entry()["name"] == "phase_margin_deg"
+    assert phase.entry()["value"] == pytest.approx(60.0)
+    # JSON has no infinity.
+    assert MarginReport("gain margin", math.inf, 2.0, "low gain").entry()["value"] is None
+
+
+@pytest.mark.parametrize(
+    ("pid", "name", "present"),
+    [
+        # What the search gave for the stage of a lab at 5 kHz: an integrator with a derivative.
+        (pt.Pid(kp=728.0, ti=4.868e-7, td=29.71e-3), "ID", {"ki", "kd"}),
+        (pt.Pid(kp=728.0, ti=4.868e-7), "I", {"ki"}),
+        (pt.Pid(kp=1e5, ti=0.01), "PI", {"kp", "ti", "ki"}),
+        (pt.Pid(kp=1e5, ti=0.01, td=1e-3), "PID", {"kp", "ti", "ki", "td", "kd"}),
+        (pt.Pid(kp=1e5, ti=math.inf, td=1e-3), "PD", {"kp", "td", "kd"}),
+        # Below an interval an integral time is no time.
+        (pt.Pid(kp=1e5, ti=1e-4), "PI", {"kp", "ki"}),
+    ],
+)
+def test_a_gain_that_vanishes_is_left_out(pid: pt.Pid, name: str, present: set[str]) -> None:
+    dt = 2e-4
+    gains = gains_of(pid, dt)
+    assert gains.name == name
+    assert {key for key, value in gains._asdict().items() if value is not None} == present | {
+        "name"
+    }
+    # The law of the gains that are left is the law, at all frequencies.
+    q = 1.0 - np.exp(-2j * np.pi * np.linspace(1e-4, 0.5, 500))
+    p, i, d = pid.kp, pid.kp * dt / pid.ti, pid.kp * pid.td / dt
+    left = (gains.kp or 0.0) * q + (gains.ki or 0.0) * dt + (gains.kd or 0.0) / dt * q**2
+    assert np.abs(left - (p * q + i + d * q**2)).max() < 0.01 * (i + 4.0 * d + p)
+
+
 def test_shares_of_what_was_asked_for() -> None:
     assert MarginReport("gain margin", 4.0, 2.0, "low gain").share == 0.5
     assert MarginReport("sensitivity", 1.5, 2.0, "low gain").share == 0.75
@@ -262,7 +301,9 @@ def test_margins_that_no_gains_keep_are_refused_with_the_nearest() -> None:
 
 
 def test_a_gain_margin_far_out_of_reach_is_named_not_stability() -> None:
-    words = r"margins\.gain is 1e\+09: .* the nearest have \d+\.?\d* .* times too low"
+    words = (
+        r"margins\.gain is 180 dB, a factor of 1e\+09: .* nearest have \d+\.?\d* dB .* dB too low"
+    )
     with pytest.raises(pt.ParameterError, match=words):
         pt.tune(published_stage(), dt=0.02, limits=LIMITS, margins=pt.Margins(gain=1e9), **QUICK)
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Unit",
     "best_length_unit",
+    "decibels",
     "drive_text",
     "drive_word",
     "known_units",
@@ -253,6 +254,18 @@ def _end(title: str, end: int, marks: str) -> int:
 
 def _blanks(title: str) -> set[str]:
     return {letter for letter in set(title) if letter.isspace()}
+
+
+def decibels(factor: float) -> float:
+    """Return a factor on an amplitude in dB; minus infinity for 0.
+
+    Examples
+    --------
+    >>> from piezotrack._support.units import decibels
+    >>> round(decibels(2.0), 2), decibels(0.0)
+    (6.02, -inf)
+    """
+    return 20.0 * math.log10(factor) if factor > 0.0 else -math.inf
 
 
 def best_length_unit(stroke_m: float) -> tuple[str, float]:

@@ -21,6 +21,7 @@ OPTIONS = {
     "factor": "decimate",
     "largest_error": "allowed_um",
     "margins.gain": "gain_margin",
+    "margins.phase": "phase_margin",
     "margins.sensitivity": "sensitivity",
     "units": "unit",
 }

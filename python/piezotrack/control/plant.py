@@ -5,7 +5,7 @@ from __future__ import annotations
 import copyreg
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from .timing import Timing
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..stages.inverse import InvertibleStage
+    from ..stages.inverse import Inverse, InvertibleStage
 
     Array = NDArray[np.float64]
 
@@ -31,6 +31,7 @@ __all__ = [
     "linearised_plants",
     "lowest_settled_displacement",
     "plant_of",
+    "plant_of_inverse",
     "timing_on",
 ]
 
@@ -58,6 +59,15 @@ def plant_of(stage: Plant | IdentifiedModel) -> VirtualStage:
         "a stage or an identified model",
     )
     return VirtualStage.of(stage)
+
+
+def plant_of_inverse(inverse: Inverse, **parts: Any) -> VirtualStage:
+    """Return the stage that an inverse inverts, with its offset and delay.
+
+    `parts` are those of ``VirtualStage.of``, as its noise.
+    """
+    plant = VirtualStage.of(inverse.stage, delay=inverse.delay, **parts)
+    return replace(plant, sensor=replace(plant.sensor, offset=inverse.offset))
 
 
 def displacement_range(

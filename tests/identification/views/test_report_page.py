@@ -19,6 +19,7 @@ import piezotrack as pt
 from piezotrack._support.display.result import Result
 from piezotrack._support.page.parts import Picture
 from piezotrack._support.page.pdf import _fitted, _width, _wrapped
+from piezotrack._support.units import decibels
 from piezotrack.errors import DataError, ParameterError
 from piezotrack.identification.views.report_page.again import python_call
 from piezotrack.identification.views.report_page.page import report_page
@@ -175,7 +176,7 @@ def test_controller_and_suggestion_are_shown(tmp_path: Path) -> None:
     )  # fmt: skip
     text = written(plays(), tmp_path / "report.html", controller=tuned, suggestion=Drive()).decode()
     assert text.index("0 to 3.6 V &amp; up") < text.index("gain margin")
-    assert f"gain margin {tuned.kept[0].value:.3g}" in text
+    assert f"gain margin {decibels(tuned.kept[0].value):.3g} dB" in text
     assert text.index("gain margin") < text.index("sha256")
 
 

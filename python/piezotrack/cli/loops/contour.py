@@ -25,7 +25,6 @@ from ..options import (
 )
 from ..output import Output
 from .loop_options import (
-    MODEL,
     NO_FEEDBACK,
     PAPER,
     AmplifierBandwidth,
@@ -36,10 +35,8 @@ from .loop_options import (
     Loop,
     LoopDelay,
     Noise,
-    StageName,
     Td,
     Ti,
-    check_stage,
     noise_metres,
     refuse_of_other_stage,
 )
@@ -77,7 +74,15 @@ def contour_command(
     table_2: Annotated[
         bool, typer.Option("--table-2", help="The nine circles of Table 2 of Xu and Li 2010.")
     ] = False,
-    stage: StageName = None,
+    stage: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar=f"FILE|{PAPER}",
+            help=f"Stage to simulate: another model file, given twice for x and y, or {PAPER}. "
+            "Default the models themselves.",
+            show_default=False,
+        ),
+    ] = None,
     out: Out = Path("results"),
     overwrite: Overwrite = False,
     lag: Annotated[
@@ -147,7 +152,7 @@ def contour_command(
         refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
     _check(context, models, path, table_2, feedforward, of_model)
     both = loop, replace(loop, kp=gains[1])
-    xy = OwnStage(models, both) if of_model else PaperStage(models, loop, seed)
+    xy = OwnStage(models, both, stage) if of_model else PaperStage(models, loop, seed)
     plant = _changed(xy.stage(noise_metres(noise_nm), bandwidth, seed), lag, cross_talk)
     desired = None if path is None else _path(path, duration, period, path_dt, xy.place(plant))
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
@@ -173,7 +178,8 @@ def contour_command(
     lines = [f"stage: {xy.name}: {between}; {how}", words]
     if of_model and not loop.has_feedback:
         lines.append(NO_FEEDBACK)
-    result.show("\n".join(lines), document | {"stage": MODEL if of_model else PAPER}, written)
+    simulated = " and ".join(dict.fromkeys(stage)) if stage else "model" if of_model else PAPER
+    result.show("\n".join(lines), document | {"stage": simulated}, written)
 
 
 def _gains(kp: str | None) -> tuple[float | None, float | None]:
@@ -186,13 +192,17 @@ def _gains(kp: str | None) -> tuple[float | None, float | None]:
     return parts[0], parts[-1]
 
 
-def _is_own(stage: str | None, models: list[Path] | None, table_2: bool) -> bool:
-    """Whether the models themselves are simulated."""
-    check_stage(stage)
-    if stage == MODEL and (not models or table_2):
-        reason = "with --table-2" if table_2 else "without a model file"
-        raise ParameterError("--stage", f"{MODEL} {reason}", PAPER)
-    return bool(models) and stage != PAPER and not table_2
+def _is_own(stage: list[str] | None, models: list[Path] | None, table_2: bool) -> bool:
+    """Whether stages of models are simulated."""
+    if stage in (None, [], [PAPER]):
+        return bool(models) and not stage and not table_2
+    words = " ".join(stage)
+    if PAPER in stage or len(stage) > 2:
+        raise ParameterError("--stage", words, f"one model file, or that of x and of y, or {PAPER}")
+    if not models or table_2:
+        reason = "with --table-2" if table_2 else "without MODEL_X, whose inverse is to be played"
+        raise ParameterError("--stage", f"{words} {reason}", f"{PAPER}")
+    return True
 
 
 def _check(

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..._support.units import shown_unit
+from ..._support.units import decibels, shown_unit
 from ...errors import ParameterError
 from ..options import number_range, refuse_without_effect
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from ...control.laws.pid import Pid
     from ...control.loop.stability import LoopCheck
     from ...control.loop.tracking import Tracking
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from ...stages.virtual import VirtualStage
 
 __all__ = [
-    "MODEL",
     "NO_FEEDBACK",
     "PAPER",
     "AmplifierBandwidth",
@@ -37,10 +35,10 @@ __all__ = [
     "LoopDelay",
     "Noise",
     "StageFile",
-    "StageName",
+    "StageModel",
     "Td",
     "Ti",
-    "check_stage",
+    "check_same_drive",
     "drive_notes",
     "driven_by_voltage",
     "known_model",
@@ -48,12 +46,13 @@ __all__ = [
     "refuse_of_other_stage",
     "simulated",
     "small_margins",
+    "stage_model",
     "unit_of",
     "zero_words",
 ]
 
-# Names of the stages that can be simulated: the model itself, and that of the paper.
-MODEL, PAPER = "model", "xu-li-2010"
+# Name of the stage of the paper, which can be simulated without a file.
+PAPER = "xu-li-2010"
 NO_FEEDBACK = (
     "no feedback: give --kp in V/um and --ti in s for a PID controller; in um/um for a drive in um"
 )
@@ -70,12 +69,12 @@ StageFile = Annotated[
         show_default=False,
     ),
 ]
-StageName = Annotated[
+StageModel = Annotated[
     str | None,
     typer.Option(
-        metavar=f"{MODEL}|{PAPER}",
-        help=f"Stage to simulate: the model itself ({MODEL}), or the virtual stage of the paper "
-        f"({PAPER}). Default {MODEL}.",
+        metavar="FILE",
+        help="Stage to simulate: another model file, for which the margins hold too. Default the "
+        "model itself.",
         show_default=False,
     ),
 ]
@@ -299,7 +298,7 @@ def small_margins(loop: LoopCheck) -> list[str]:
     """Remark on a stable loop near its limit."""
     small = []
     if loop.stable_gains is not None and loop.stable_gains[1] < LEAST_MARGIN:
-        small.append(f"its gain margin is below {LEAST_MARGIN:g}")
+        small.append(f"its gain margin is below {decibels(LEAST_MARGIN):.2g} dB")
     if loop.sensitivity > MOST_SENSITIVITY:
         small.append(f"Ms is above {MOST_SENSITIVITY:g}")
     if not loop.stable or not small:
@@ -321,25 +320,30 @@ def simulated(
     stage: str | None, known: IdentifiedModel, noise: float, bandwidth: float, seed: int
 ) -> VirtualStage:
     """Make the stage of `StageFile`, with the noise [m] of a sensor and a bandwidth [Hz]."""
-    from pathlib import Path
-
     from ...stages.virtual import VirtualStage
 
     if stage == PAPER:
         return VirtualStage.xu_li_2010(seed=seed)
-    other = known if stage is None else known_model(Path(stage), zero=known.zero != 0.0)
-    if other.drive_unit != known.drive_unit:
-        one, two = (shown_unit(model.drive_unit)[0] for model in (other, known))
-        raise ParameterError(
-            "--stage", f"{stage}, whose drive is in {one}", f"one in {two}, as of the model"
-        )
+    other = stage_model(stage, known)
     return VirtualStage.of(other, noise=noise, bandwidth=bandwidth, seed=seed)
 
 
-def check_stage(stage: str | None) -> None:
-    """Refuse a stage of another name."""
-    if stage not in (None, MODEL, PAPER):
-        raise ParameterError("--stage", f"'{stage}'", f"{MODEL} or {PAPER}")
+def stage_model(stage: str | None, known: IdentifiedModel) -> IdentifiedModel:
+    """Load the model of `StageFile`, with a drive like that of the other; default that itself."""
+    if stage is None:
+        return known
+    other = known_model(Path(stage), zero=known.zero != 0.0)
+    check_same_drive(other, stage, known.drive_unit)
+    return other
+
+
+def check_same_drive(other: IdentifiedModel, stage: str, drive_unit: str) -> None:
+    """Refuse a stage whose drive is in another unit than that of the model or controller."""
+    if other.drive_unit != drive_unit:
+        one, two = (shown_unit(unit)[0] for unit in (other.drive_unit, drive_unit))
+        raise ParameterError(
+            "--stage", f"{stage}, whose drive is in {one}", f"one in {two}, as of the model"
+        )
 
 
 def refuse_of_other_stage(context: typer.Context, own: bool) -> None:

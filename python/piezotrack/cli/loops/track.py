@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -24,8 +24,8 @@ from ..options import (
     refuse_without_effect,
 )
 from ..output import Output
+from .controller_files import controller_in, stage_of_controller
 from .loop_options import (
-    MODEL,
     NO_FEEDBACK,
     PAPER,
     AmplifierBandwidth,
@@ -37,10 +37,9 @@ from .loop_options import (
     Loop,
     LoopDelay,
     Noise,
-    StageName,
+    StageFile,
     Td,
     Ti,
-    check_stage,
     drive_notes,
     known_model,
     noise_metres,
@@ -52,8 +51,12 @@ from .loop_options import (
 )
 
 if TYPE_CHECKING:
+    from ...control.controller.controller import Controller
     from ...control.loop.tracking import Tracking
+    from ...control.timing import Timing
+    from ...identification.fitted.identified_model import IdentifiedModel
     from ...references.reference import Reference
+    from ...stages.virtual import VirtualStage
 
 __all__ = [
     "BeyondReach",
@@ -79,7 +82,13 @@ BeyondReach = Annotated[
 @report_errors
 def track_command(
     context: typer.Context,
-    model: ModelFile,
+    model: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MODEL|CONTROLLER",
+            help="Model file in JSON, or a controller file, as `tune` writes it.",
+        ),
+    ],
     reference: Annotated[
         str,
         typer.Option(
@@ -88,7 +97,7 @@ def track_command(
             "CSV file with time and displacement.",
         ),
     ],
-    stage: StageName = None,
+    stage: StageFile = None,
     out: Out = Path("results"),
     overwrite: Overwrite = False,
     dt: Interval = None,
@@ -142,8 +151,7 @@ def track_command(
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="Device on which this computer closes the loop, as of `measure`; MODEL is then a "
-            "controller file, as `tune` writes it.",
+            help="Device on which this computer closes the loop of a CONTROLLER, as of `measure`.",
             show_default=False,
         ),
     ] = None,
@@ -151,10 +159,7 @@ def track_command(
     quiet: Quiet = False,
 ) -> None:
     """Track a reference in closed loop."""
-    from ..._support.files.writing import picture_files
     from ...control.controller.controller import Controller
-    from ...control.loop.stability import check_loop
-    from ...control.running.track import track
     from ...control.timing import Timing
     from ...references.parse import reference_of
 
@@ -164,21 +169,36 @@ def track_command(
         result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
         _on_device(model, device, desired, result, beyond_reach=beyond_reach, unstable=unstable)
         return
-    check_stage(stage)
+    desired = reference_of(reference, duration=duration, period=period)
+    timing = Timing(delay=delay, jitter=jitter)
+    free = {"beyond_reach": beyond_reach, "unstable": unstable}
+    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     of_model = stage != PAPER
+    refuse_of_other_stage(context, of_model)
+    if of_model and not (noise_nm or jitter):
+        refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
+    sensor: dict[str, Any] = {
+        "noise": noise_metres(noise_nm),
+        "bandwidth": bandwidth,
+        "seed": seed,
+    }
+    if (loop := controller_in(model)) is not None:
+        refuse_without_effect(context, OF_A_CONTROLLER, "with a controller file, which has its own")
+        if stage in (None, PAPER):
+            refuse_without_effect(context, ["zero"], "without a model file as --stage")
+        plant, known = stage_of_controller(loop, stage, zero=zero, **sensor)
+        name = f"stage: {_stage_name(stage, 'the model of its feedforward')}, controller: {model}"
+        _simulate(result, plant, loop, desired, timing, free, known, name, stage)
+        return
     settings = Loop(of_model, dt, limits, feedback, kp, ti, td, tt)
     settings.check(context)
-    refuse_of_other_stage(context, of_model)
     if not feedforward:
         refuse_without_effect(context, ["online"], "with --no-feedforward")
     if not (feedforward or repetitive or settings.has_feedback):
         raise ParameterError("--no-feedforward: expected --kp and --ti, or nothing moves the stage")
     if not repetitive:
         refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
-    if of_model and not (noise_nm or jitter):
-        refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
     known = known_model(model, zero=zero, paper=not of_model)
-    desired = reference_of(reference, duration=duration, period=period)
     playback: Literal["table", "online"] = "online" if online else "table"
     loop = Controller(
         dt=settings.dt(known, desired),
@@ -188,33 +208,61 @@ def track_command(
         repetitive=settings.repetitive(known, desired, kq, tq) if repetitive else None,
         drive_unit=unit_of(of_model, known),
     )
-    plant = simulated(None if of_model else PAPER, known, noise_metres(noise_nm), bandwidth, seed)
-    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
+    plant = simulated(stage, known, *sensor.values())
+    name = f"stage: {_stage_name(stage, model.name)}"
+    _simulate(result, plant, loop, desired, timing, free, known, name, stage)
+
+
+def _stage_name(stage: str | None, default: str) -> str:
+    return "the virtual stage of Xu and Li 2010" if stage == PAPER else stage or default
+
+
+def _simulate(
+    result: Output,
+    plant: VirtualStage,
+    loop: Controller,
+    desired: Reference,
+    timing: Timing,
+    free: dict[str, bool],
+    known: IdentifiedModel | None,
+    name: str,
+    stage: str | None,
+) -> None:
+    """Track a reference on a simulated stage; print and write the run."""
+    from ..._support.files.writing import picture_files
+    from ...control.loop.stability import check_loop
+    from ...control.running.track import track
+
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
-    free = {"beyond_reach": beyond_reach, "unstable": unstable}
-    run = track(plant, loop, desired, timing=Timing(delay=delay, jitter=jitter), **free)
-    name = f"{model.name}{zero_words(known)}" if of_model else "the virtual stage of Xu and Li 2010"
-    lines = [f"stage: {name}", run.summary()]
-    notes = drive_notes(known, run)
+    run = track(plant, loop, desired, timing=timing, **free)
+    zeroed = zero_words(known) if known is not None and stage != PAPER else ""
+    lines = [f"{name}{zeroed}", run.summary()]
+    notes = [] if known is None else drive_notes(known, run)
     lines += [f"note  {note}" for note in notes]
     if loop.feedback is not None or loop.repetitive is not None:
-        margins = check_loop(plant, loop, delay=delay).middle
+        margins = check_loop(plant, loop, delay=timing.delay).middle
         lines.append(f"loop at {margins}")
         lines += [f"note  {note}" for note in small_margins(margins)]
-    elif of_model:
+    elif stage != PAPER:
         lines.append(NO_FEEDBACK)
     entries = {
-        "model_drive_range": known.drive_range,
+        "model_drive_range": None if known is None else known.drive_range,
         "notes": notes,
-        "stage": MODEL if of_model else PAPER,
+        "stage": stage or "model",
     }
-    result.show("\n".join(lines), run.document() | entries, run.save(out, entries=entries))
+    written = run.save(result.out, entries=entries)
+    result.show("\n".join(lines), run.document() | entries, written)
 
 
-# Options of a simulation, or of a controller that a file has.
+# Options of a controller that a file has.
+OF_A_CONTROLLER = (
+    *("dt", "limits", "feedforward", "online", "feedback", "kp", "ti", "td", "tt"),
+    *("repetitive", "kq", "tq"),
+)
+# Those, and options of a simulation.
 SIMULATED = (
-    *("stage", "dt", "limits", "zero", "feedforward", "online", "feedback", "kp", "ti", "td", "tt"),
-    *("repetitive", "kq", "tq", "delay", "jitter", "noise_nm", "bandwidth", "seed"),
+    *OF_A_CONTROLLER,
+    *("stage", "zero", "delay", "jitter", "noise_nm", "bandwidth", "seed"),
 )
 
 

@@ -28,8 +28,10 @@ from .loop_options import (
     Loop,
     LoopDelay,
     Noise,
+    StageModel,
     known_model,
     noise_metres,
+    stage_model,
     zero_words,
 )
 
@@ -48,6 +50,7 @@ def tune_command(
             show_default=False,
         ),
     ] = None,
+    stage: StageModel = None,
     out: Out = Path("results"),
     overwrite: Overwrite = False,
     dt: Interval = None,
@@ -73,7 +76,7 @@ def tune_command(
         float | None,
         typer.Option(help="Largest rms error in um.", show_default=False),
     ] = None,
-    gain_margin: Annotated[float, typer.Option(help="Least gain margin, a factor.")] = 2.0,
+    gain_margin: Annotated[float, typer.Option(help="Least gain margin in dB.")] = 6.0,
     phase_margin: Annotated[float, typer.Option(help="Least phase margin in degrees.")] = 30.0,
     sensitivity: Annotated[float, typer.Option(help="Largest sensitivity Ms.")] = 2.0,
     mode_spread: Annotated[
@@ -110,13 +113,17 @@ def tune_command(
     from ...references.parse import reference_of
     from ...stages.virtual import VirtualStage
 
-    _within("--gain-margin", gain_margin, 1.0, math.inf, "a factor above 1")
+    _within("--gain-margin", gain_margin, 1e-6, 400.0, "dB, above 0 and below 400")
     _within("--phase-margin", phase_margin, 0.0, 180.0, "degrees, 0 to below 180")
     _within("--sensitivity", sensitivity, 1.0, math.inf, "a factor above 1")
     _within("--mode-spread", mode_spread, 0.0, 95.0, "per cent, 0 to below 95")
     _within("--gain-spread", gain_spread, 0.0, 95.0, "per cent, 0 to below 95")
     _within("--delay-spread", delay_spread, 0.0, math.inf, "seconds, 0 or above")
-    margins = Margins(gain=gain_margin, phase=math.radians(phase_margin), sensitivity=sensitivity)
+    margins = Margins(
+        gain=10.0 ** (gain_margin / 20.0),
+        phase=math.radians(phase_margin),
+        sensitivity=sensitivity,
+    )
     spread = Spread(delay=(0.0, delay_spread), mode=0.01 * mode_spread, gain=0.01 * gain_spread)
     known = known_model(model, zero=zero)
     desired = [reference_of(text, duration=duration, period=period) for text in reference or ()]
@@ -124,8 +131,10 @@ def tune_command(
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     pictures = [name for i in range(len(desired)) for name in picture_files(picture_name(i))]
     result.will_write(["tuning.json", "controller.json", *pictures])
+    plays = stage_model(stage, known)
+    plant = VirtualStage.of(plays, noise=noise_metres(noise_nm), bandwidth=bandwidth, seed=seed)
     tuned = tune(
-        [VirtualStage.of(known, noise=noise_metres(noise_nm), bandwidth=bandwidth, seed=seed)],
+        [plant] if plays is known else [plant, known],
         desired or None,
         dt=settings.dt(known, desired[0] if desired else None),
         limits=settings.volts(known),
@@ -140,7 +149,8 @@ def tune_command(
         timing=Timing(delay=delay),
         search=TuningSearch(seed=seed),
     )
-    result.show(f"{tuned}{zero_words(known)}", tuned.document(), tuned.save(out))
+    words = f"stage: {stage or model.name}{zero_words(known)}\n{tuned}"
+    result.show(words, tuned.document(), tuned.save(out))
 
 
 def _within(option: str, value: float, low: float, high: float, expected: str) -> None:

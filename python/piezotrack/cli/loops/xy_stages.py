@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ...errors import ParameterError
-from .loop_options import PAPER, drive_notes, driven_by_voltage
+from .loop_options import PAPER, drive_notes, driven_by_voltage, stage_model
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,16 +22,24 @@ __all__ = ["OwnStage", "PaperStage"]
 
 
 class OwnStage:
-    """The stage of one's own models: of x and y, or one for both."""
+    """The stage of one's own models, of x and y or one for both, or of others in their place."""
 
-    def __init__(self, models: list[Path] | None, loops: tuple[Loop, Loop]) -> None:
+    def __init__(
+        self,
+        models: list[Path] | None,
+        loops: tuple[Loop, Loop],
+        stages: list[str] | None = None,
+    ) -> None:
         from ...identification.fitted.model_file import load
 
         files = models or []
         self._files = [files[0], files[-1]]
         self._models: list[IdentifiedModel] = [load(file) for file in self._files]
         self._loops = loops
-        names = dict.fromkeys(str(file) for file in self._files)
+        others: list[str | None] = [stages[0], stages[-1]] if stages else [None, None]
+        pairs = zip(others, self._models, strict=True)
+        self._plants = [stage_model(other, model) for other, model in pairs]
+        names = dict.fromkeys(stages or map(str, self._files))
         self.name = " and ".join(names)
         self.words = "feedforward by the inverse of each"
 
@@ -43,7 +51,7 @@ class OwnStage:
         # With one seed both would have the same noise.
         x, y = (
             VirtualStage.of(model, noise=noise, bandwidth=bandwidth, seed=seed + axis * (1 << 32))
-            for axis, model in enumerate(self._models)
+            for axis, model in enumerate(self._plants)
         )
         return XYStage(x=x, y=y)
 

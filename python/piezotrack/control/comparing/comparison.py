@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from ..._support.display.result import Result
 from ..._support.files.writing import write_result
+from ..._support.units import decibels
 
 if TYPE_CHECKING:
     import os
@@ -198,7 +199,7 @@ class ControllerComparison(Result):
                 {
                     "name": row.name,
                     "sensitivity": row.sensitivity,
-                    "gain_margin": _finite_or_none(row.gain_margin),
+                    "gain_margin_dB": _decibels(row.gain_margin),
                     "figures": [
                         [None if one is None else _figures_of(one) for one in variant]
                         for variant in row.cells
@@ -234,6 +235,10 @@ def _figures_of(cell: Cell) -> dict[str, Any]:
     values = {"rms": cell.rms, "spread": cell.spread, **cell._asdict()}
     found: dict[str, Any] = {name: _finite_or_none(values[name]) for name in NUMBERS}
     return {**found, "draws": [_finite_or_none(one) for one in cell.draws]}
+
+
+def _decibels(factor: float | None) -> float | None:
+    return _finite_or_none(None if factor is None else decibels(factor))
 
 
 def _finite_or_none(value: float | None) -> float | None:

@@ -20,7 +20,7 @@ from ..controller.controller import Controller
 from ..loop.preconditions import check_drive_unit
 from ..loop.run import Run
 from ..on_device.playing import check_playable
-from ..plant import plant_of, timing_on
+from ..plant import plant_of, plant_of_inverse, timing_on
 from ..timing import Timing
 from .iterative_learning import IterativeLearning
 from .trials import PlayedTrials, SimulatedTrials
@@ -373,8 +373,6 @@ def _model_of(
     stage: Plant | IdentifiedModel | Device, controller: Controller
 ) -> Plant | IdentifiedModel:
     """Return the model of the controller's feedforward with its delay, or else the stage."""
-    from ...stages.virtual import VirtualStage
-
     if not isinstance(controller, Controller) or controller.feedforward is None:
         if isinstance(stage, Device):
             raise ParameterError(
@@ -383,7 +381,7 @@ def _model_of(
                 "a model of the stage behind the device, as pt.identify gives it",
             )
         return stage
-    return VirtualStage.of(controller.feedforward.stage, delay=controller.feedforward.delay)
+    return plant_of_inverse(controller.feedforward)
 
 
 def _rest_on(

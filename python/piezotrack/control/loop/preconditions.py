@@ -99,7 +99,7 @@ def check_stable(stage: VirtualStage, controller: Controller, delay: float) -> N
             kp = 1e-6 * scale * law._pid.kp
             gains = f"{share * kp:.3g} {unit}/um in place of {kp:.3g}"
             problem += f"; at the limit kp would be {gains}"
-            problem += ", and half of that has a gain margin of 2" if low < 0.5 * share else ""
+            problem += ", and half of that has a gain margin of 6 dB" if low < 0.5 * share else ""
         else:
             problem += f"; at the limit the gain would be {share:.3g} times as large"
     elif without:

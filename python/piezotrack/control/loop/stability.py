@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import expect, not_negative
 from ..._support.display.result import Result
-from ..._support.units import shown_unit
+from ..._support.units import decibels, shown_unit
 from ...errors import ParameterError
 from ..controller.controller import Controller
 from ..plant import linearised_plants, plant_of
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = ["LoopCheck", "LoopReport", "LoopResponse", "check_loop"]
+
+# Frequencies of the grids, each within an interval of the one before, that find the bandwidth.
+GRIDS = (150, 40, 40)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +61,10 @@ class LoopCheck:
         sooner: use `check_loop` with that delay.
     crossover : float or None
         Highest frequency at which its gain is 1 [Hz].
+    bandwidth : float or None
+        Lowest frequency at which the closed loop of the feedback without the repetitive part,
+        L/(1 + L), is 3 dB below 1 [Hz]; None of an unstable loop, of one that is below at low
+        frequencies already, and of one that never is.
     sensitivity : float
         Ms, the largest amplification of a disturbance.
     slowest_root : float or None
@@ -84,6 +91,7 @@ class LoopCheck:
     phase_margin: float | None
     delay_margin: float | None
     crossover: float | None
+    bandwidth: float | None
     sensitivity: float
     slowest_root: float | None
     periods: float | None
@@ -104,9 +112,11 @@ class LoopCheck:
         # With a repetitive part these are margins of another loop: of the feedback alone.
         of = "" if self.small_gain is None else " of the feedback"
         if self.stable and self.phase_margin is not None:
-            text += f", phase margin{of} {self.phase_margin:.2g} rad"
+            text += f", phase margin{of} {math.degrees(self.phase_margin):.3g} deg"
         if self.stable:
             text += f", Ms{of} {self.sensitivity:.3g}"
+        if self.bandwidth is not None:
+            text += f", bandwidth{of} {self.bandwidth:.3g} Hz"
         if self.periods is not None:
             text += f", learns in {self.periods:.2g} periods"
         return text
@@ -122,10 +132,13 @@ class LoopCheck:
         return {
             f"plant_gain_m_per_{self.drive_unit}": self.gain,
             "stable": self.stable,
-            "gain_margin": self.gain_margin,
-            "phase_margin_rad": self.phase_margin,
+            "gain_margin_dB": None if self.gain_margin is None else decibels(self.gain_margin),
+            "phase_margin_deg": (
+                None if self.phase_margin is None else math.degrees(self.phase_margin)
+            ),
             "delay_margin_s": self.delay_margin,
             "crossover_Hz": self.crossover,
+            "bandwidth_Hz": self.bandwidth,
             "sensitivity": self.sensitivity,
             "learning_periods": self.periods,
         }
@@ -137,7 +150,7 @@ class LoopCheck:
         low, high = self.stable_gains
         if low > 1.0:
             return f", stable from {low:.3g} times the gain on"
-        return f", gain margin {high:.3g}" if math.isfinite(high) else ""
+        return f", gain margin {decibels(high):.3g} dB" if math.isfinite(high) else ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -303,6 +316,8 @@ def check_loop(
 def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
     loop = _core.check_loop(controller._core, plant)
     slowest, margin = loop["slowest"], loop["gain_margin"]
+    feedback = replace(controller, repetitive=None)
+    bandwidth = _bandwidth(feedback, plant) if loop["stable"] else None
     return LoopCheck(
         gain=plant.static_gain,
         stable=loop["stable"],
@@ -312,6 +327,7 @@ def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
         phase_margin=loop["phase_margin"],
         delay_margin=loop["delay_margin"],
         crossover=loop["crossover"],
+        bandwidth=bandwidth,
         sensitivity=loop["sensitivity"],
         slowest_root=None if slowest is None else slowest[0],
         periods=loop["periods"],
@@ -320,3 +336,17 @@ def _check(controller: Controller, plant: _core.LoopPlant) -> LoopCheck:
         hint=loop["hint"],
         drive_unit=controller.drive_unit,
     )
+
+
+def _bandwidth(feedback: Controller, plant: _core.LoopPlant) -> float | None:
+    """Return the lowest frequency at which a closed loop is 3 dB below 1 [Hz], on finer grids."""
+    low, high = 1e-6 / feedback.dt, 0.4999 / feedback.dt
+    for count in GRIDS:
+        frequency = np.geomspace(low, high, count)
+        pairs = _core.loop_response(feedback._core, plant, frequency.tolist())[2]
+        size = np.hypot(*np.asarray(pairs).T)
+        below = np.flatnonzero(size < math.sqrt(0.5))
+        if not below.size or below[0] == 0:
+            return None
+        low, high = frequency[below[0] - 1], frequency[below[0]]
+    return math.sqrt(low * high)

@@ -281,6 +281,7 @@ class Tracking(Result):
             "unit": "errors in m, phase lag in rad, widest loop as a part of the travel",
             "from_s": self.settled,
             "metrics": asdict(self.metrics),
+            "true_metrics": asdict(self.score(true=True)),
             "periods": [asdict(period) for period in self.periods],
             "model_drive_range": None,
             "notes": [],

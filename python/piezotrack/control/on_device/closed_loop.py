@@ -16,6 +16,7 @@ from ...hardware.safe_end import lead, terminated
 from ..loop.preconditions import check_period
 from ..loop.run import Run
 from ..loop.tracking import Tracking
+from ..plant import plant_of_inverse
 from .guard import Guard
 from .latency import (
     check_exchanging,
@@ -176,11 +177,9 @@ def track_on(
 
 def _check_model(run: Run, latency: Latency, *, beyond_reach: bool, unstable: bool) -> None:
     """Check what can be checked before: with the model of the feedforward, where there is one."""
-    from ...stages.virtual import VirtualStage
-
     inverse = run.controller.feedforward
     if inverse is not None:
-        plant = VirtualStage.of(inverse.stage, delay=inverse.delay)
+        plant = plant_of_inverse(inverse)
         run.check(plant, latency.p99, unstable=unstable, beyond_reach=beyond_reach)
 
 

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..._support.messages import quoted
+from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ..parts.filters import LowPass, Notch
 from ..parts.repetitive import Repetitive, ZeroPhase
-from .structures import SOUGHT, Nominal, law_of, law_ranges, nominal_of
+from .structures import SOUGHT, Nominal, gains_of, law_of, law_ranges, nominal_of
 
 if TYPE_CHECKING:
     from ... import _core
@@ -68,18 +69,44 @@ class Box(NamedTuple):
             )
         return Parts(law, tuple(filters), repetitive)
 
-    def edges(self, settings: dict[str, float]) -> list[str]:
-        """Name the settings that are at an end of their range."""
+    def edges(self, settings: dict[str, float], drive_unit: str) -> list[str]:
+        """Name the settings that are at an end of their range, with the drive's unit of a gain."""
         notes = []
+        law = self.parts(settings).feedback
+        absent = ["kd", "order", "lead", "notch_depth"]
+        if law._pid is not None and gains_of(law._pid, self.dt).kp is None:
+            absent.append("kp")
         for name, low, high, logarithmic in self.ranges:
             ends = (math.log(low), math.log(high)) if logarithmic else (low, high)
             value = math.log(settings[name]) if logarithmic else settings[name]
             place = (value - ends[0]) / (ends[1] - ends[0])
             if place > 0.999 and name != "cutoff":
-                notes.append(f"{name} is at the upper end of its range, {high:.4g}")
-            elif place < 0.001 and name not in ("kd", "order", "lead", "notch_depth"):
-                notes.append(f"{name} is at the lower end of its range, {low:.4g}")
+                notes.append(
+                    f"{name} at the upper end of its range, {self._shown(name, high, drive_unit)}"
+                )
+            elif place < 0.001 and name not in absent:
+                notes.append(
+                    f"{name} at the lower end of its range, {self._shown(name, low, drive_unit)}"
+                )
         return notes
+
+    def _shown(self, name: str, value: float, drive_unit: str) -> str:
+        """Write a setting with its unit; gains a sample as gains."""
+        unit, scale = shown_unit(drive_unit)
+        shown = {
+            "kp": (1e-6 * scale, f"{unit}/um"),
+            "ki": (1e-6 * scale / self.dt, f"{unit}/(um s)"),
+            "kd": (1e-6 * scale * self.dt, f"{unit} s/um"),
+            "lead_time": (1e3, "ms"),
+            "lag_time": (1e3, "ms"),
+            "switching": (scale, unit),
+            "observer": (1.0, "Hz"),
+            "cutoff": (1.0, "Hz"),
+            "notch_frequency": (1.0, "Hz"),
+            "kq": (scale, f"{unit}/um"),
+        }
+        factor, text = shown.get(name, (1.0, ""))
+        return f"{factor * value:.4g} {text}".rstrip()
 
 
 def _whole(value: float) -> int:

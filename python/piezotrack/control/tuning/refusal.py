@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...errors import ParameterError
+from .tuned import MARGIN_UNITS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +17,7 @@ __all__ = ["refusal"]
 
 
 class _Short(NamedTuple):
-    """Margin that the nearest gains do not have: value, plant, bound and its side."""
+    """Margin that the nearest gains do not have: value, plant, bound, its unit and its side."""
 
     name: str
     value: float
@@ -35,14 +36,19 @@ class _Short(NamedTuple):
     def refusal(self, names: Sequence[str]) -> ParameterError:
         """Name the bound, and the margin of the nearest gains."""
         side = "more" if self.least else "less"
-        off = f", {self.factor:.4g} times too {'low' if self.least else 'high'}"
-        bound = f"{_number(self.bound)}{self.unit}"
+        bound, nearest = _number(self.bound), f"{self.value:.6g}"
+        plain = bound
+        unit, shown = MARGIN_UNITS.get(f"{self.name} margin", ("", float))
+        off = f"{self.factor:.4g} times too {'low' if self.least else 'high'}"
+        if unit:
+            bound, nearest = (f"{shown(one):.6g} {unit}" for one in (self.bound, self.value))
+            plain = f"{bound}, {self.unit.format(_number(self.bound))}"
+            off = f"{shown(self.bound) - shown(self.value):.4g} {unit} too low"
         return ParameterError(
             f"margins.{self.name}",
-            bound,
+            plain,
             f"one that some gains can keep; where {bound} or {side} was asked for, the nearest "
-            f"have {self.value:.6g}{self.unit} "
-            f"({names[self.plant]}){off if self.factor > 1.1 else ''}",
+            f"have {nearest} ({names[self.plant]}){f', {off}' if self.factor > 1.1 else ''}",
         )
 
 
@@ -99,8 +105,8 @@ def _shorts(problem: TuningProblem, robustness: Sequence[tuple[float, int]]) -> 
     margins = problem.margins
     _, gain, phase, sensitivity, learning = robustness
     return [
-        _Short("gain", *gain, margins.gain),
-        _Short("phase", *phase, margins.phase, " rad"),
+        _Short("gain", *gain, margins.gain, "a factor of {}"),
+        _Short("phase", *phase, margins.phase, "{} rad"),
         _Short("sensitivity", *sensitivity, margins.sensitivity, least=False),
         _Short("learning", *learning, margins.learning, least=False),
     ]

@@ -99,7 +99,9 @@ class Solution(NamedTuple):
         edges = []
         for axis, settings in zip(self.axes, self.outcome["settings"], strict=True):
             prefix = f"{axis.name}: " if axis.name else ""
-            edges += [f"{prefix}{text}" for text in axis.box.edges(dict(settings))]
+            edges += [
+                f"{prefix}{text}" for text in axis.box.edges(dict(settings), axis.base.drive_unit)
+            ]
         return edges
 
 

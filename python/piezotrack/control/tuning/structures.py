@@ -13,9 +13,22 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from ... import _core
+    from ..laws.pid import Pid
     from ..parts.part import FeedbackLaw
 
-__all__ = ["SOUGHT", "LawName", "Nominal", "law_of", "law_ranges", "nominal_of"]
+__all__ = [
+    "SOUGHT",
+    "Gains",
+    "LawName",
+    "Nominal",
+    "gains_of",
+    "law_of",
+    "law_ranges",
+    "nominal_of",
+]
+
+# Largest share of a part of a PID law that vanishes.
+VANISHING = 0.01
 
 LawName = Literal[
     "pid",
@@ -41,6 +54,60 @@ class Nominal(NamedTuple):
 
     gain: float
     time: float
+
+
+class Gains(NamedTuple):
+    """Gains of a PID law without the parts that vanish, and without times below an interval.
+
+    Attributes
+    ----------
+    name : str
+        Its parts, as ``"PI"``.
+    kp, ti, ki, td, kd : float or None
+        Proportional gain [V/m], integral time [s] and gain [V/(m s)], derivative time [s] and gain
+        [V s/m]; None where there is none. A law without a proportional gain has no times.
+    """
+
+    name: str
+    kp: float | None
+    ti: float | None
+    ki: float | None
+    td: float | None
+    kd: float | None
+
+
+def gains_of(pid: Pid, dt: float) -> Gains:
+    """Return the gains of a PID law sampled every `dt` seconds, as they are entered.
+
+    With ``q = 1 - 1/z`` the law is ``(p q + i + d q^2) / q``, of the gains a sample ``p = Kp``,
+    ``i = Kp Ts/Ti`` and ``d = Kp Td/Ts``. The proportional part vanishes where at no frequency, at
+    which ``|q|`` is 0 to 2, it makes 1 % of the sum of the others; the derivative part likewise.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> from piezotrack.control.tuning.structures import gains_of
+    >>> gains = gains_of(pt.Pid(kp=10.0, ti=1e-6), 1e-3)
+    >>> gains.name, gains.kp, f"{gains.ki:.4g}"
+    ('I', None, '1e+07')
+    """
+    kp, ki, kd = pid.kp, pid.kp / pid.ti, pid.kp * pid.td
+    p, i, d = abs(kp), abs(ki) * dt, abs(kd) / dt
+    # Where |q| is `least`, the sum of the others in units of p |q| is smallest.
+    least = min(math.sqrt(i / d), 2.0) if d > 0.0 else 2.0
+    if i > 0.0 and p < VANISHING * (i / least + d * least):
+        has_p, has_d = False, 4.0 * d >= VANISHING * i
+    else:
+        has_p, has_d = True, 4.0 * d >= VANISHING * (2.0 * p + i)
+    letters = zip("PID", (has_p, ki != 0.0, has_d), strict=True)
+    return Gains(
+        name="".join(letter for letter, present in letters if present),
+        kp=kp if has_p else None,
+        ti=pid.ti if has_p and dt <= pid.ti < math.inf else None,
+        ki=ki if ki != 0.0 else None,
+        td=pid.td if has_p and has_d else None,
+        kd=kd if has_d else None,
+    )
 
 
 def nominal_of(plant: _core.LoopPlant) -> Nominal:

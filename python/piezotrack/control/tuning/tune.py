@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 from ..loop.contouring import contour
+from ..loop.stability import check_loop
 from ..running.track import track
 from .goal import MINIMISED
 from .problem import TuningProblem
@@ -202,6 +203,10 @@ def _simulated(problem: TuningProblem, best: Solution, solutions: list[Solution]
         history=tuple(best.outcome["history"]),
         searches=best.outcome["searches"],
         agreeing=best.outcome["agreeing"],
+        bandwidths=tuple(
+            check_loop(axis.stages[0], controller, delay=axis.timing.delay).middle.bandwidth
+            for axis, controller in zip(problem.axes, controllers, strict=True)
+        ),
     )
 
 

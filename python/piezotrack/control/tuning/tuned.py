@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from ... import _core
 from ..._support.display.result import Result
 from ..._support.files.writing import make_folder, result_set, save_figures, write_document
+from ..._support.units import decibels
 from ..loop.contouring import Contour
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from pathlib import Path
 
     from ...references.reference import Reference
@@ -21,9 +23,13 @@ if TYPE_CHECKING:
     from ..loop.tracking import Tracking
     from .margins import Margins
 
-__all__ = ["MarginReport", "Tuned", "motion_of", "picture_name"]
+__all__ = ["MARGIN_UNITS", "MarginReport", "Tuned", "motion_of", "picture_name"]
 
-UNITS = {"gain margin": "", "phase margin": " rad", "sensitivity": "", "learning": ""}
+# Units in which margins are shown, and the conversions to them.
+MARGIN_UNITS: dict[str, tuple[str, Callable[[float], float]]] = {
+    "gain margin": ("dB", decibels),
+    "phase margin": ("deg", math.degrees),
+}
 
 
 class MarginReport(NamedTuple):
@@ -34,9 +40,9 @@ class MarginReport(NamedTuple):
     name : str
         Which margin.
     value : float
-        Of the worst plant, exact.
+        Of the worst plant, exact: a gain margin as a factor, a phase margin in rad.
     bound : float
-        The bound.
+        The bound, likewise.
     plant : str
         Which plant is the worst.
     """
@@ -55,8 +61,33 @@ class MarginReport(NamedTuple):
 
     def __str__(self) -> str:
         side = "at least" if self.name in ("gain margin", "phase margin") else "at most"
-        unit = UNITS[self.name]
-        return f"{self.name} {self.value:.3g}{unit} ({side} {self.bound:.3g}{unit}), {self.plant}"
+        unit, shown = self._shown
+        unit = f" {unit}" if unit else ""
+        return (
+            f"{self.name} {shown(self.value):.3g}{unit} ({side} {shown(self.bound):.3g}{unit}), "
+            f"{self.plant}"
+        )
+
+    @property
+    def _shown(self) -> tuple[str, Callable[[float], float]]:
+        return MARGIN_UNITS.get(self.name, ("", float))
+
+    def entry(self) -> dict[str, Any]:
+        """Entry of a file, the unit in the name.
+
+        Returns
+        -------
+        dict
+            ``name``, ``value``, ``bound`` and ``plant``; a value without an end is None.
+        """
+        unit, shown = self._shown
+        value = shown(self.value)
+        return {
+            "name": "_".join([*self.name.split(), *([unit] if unit else [])]),
+            "value": value if math.isfinite(value) else None,
+            "bound": shown(self.bound),
+            "plant": self.plant,
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -93,6 +124,9 @@ class Tuned(Result):
         Best figure after each iteration; infinite as long as no candidate kept the margins.
     searches, agreeing : int
         Searches from different sides, and how many of them end within 2 % of the best.
+    bandwidths : tuple of (float or None)
+        Bandwidth of the feedback of each controller on the stage at its middle gain [Hz], as of
+        `check_loop`.
     """
 
     views: ClassVar[Mapping[str, str]] = {
@@ -113,6 +147,7 @@ class Tuned(Result):
     history: tuple[float, ...]
     searches: int
     agreeing: int
+    bandwidths: tuple[float | None, ...]
     unit: str = "m"
 
     @property
@@ -136,7 +171,8 @@ class Tuned(Result):
             "figure": self.minimised,
             f"value_{self.unit}": self.value,
             "plants": list(self.plants),
-            "kept": [one._asdict() for one in self.kept],
+            "kept": [one.entry() for one in self.kept],
+            "bandwidth_Hz": list(self.bandwidths),
             "binding": list(self.active_constraints),
         }
 
@@ -154,12 +190,17 @@ class Tuned(Result):
             "format": "piezotrack-tuning",
             "schema_version": 1,
             **(axes[0] if len(axes) == 1 else {"axes": axes}),
-            "unit": "gains in V/m, times in s, frequencies in Hz, errors in m, phase margin in rad",
+            "unit": "gains in V/m, times in s, frequencies in Hz, errors in m",
             "references": [
-                {"reference": repr(motion_of(run)), "metrics": asdict(run.metrics)}
+                {
+                    "reference": repr(motion_of(run)),
+                    "metrics": asdict(run.metrics),
+                    "true_metrics": asdict(run.score(true=True)),
+                }
                 for run in self.runs
             ],
-            "kept": [one._asdict() for one in self.kept],
+            "kept": [one.entry() for one in self.kept],
+            "bandwidth_Hz": list(self.bandwidths),
             "plants": list(self.plants),
             "binding": list(self.active_constraints),
             "controllers": self.candidates,

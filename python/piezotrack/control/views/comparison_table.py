@@ -8,6 +8,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..._support.display.table import words
+from ..._support.units import decibels
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +22,7 @@ WIDTH = 100
 HEADINGS = (10, 6)
 # A number and its unit stay together.
 UNIT = re.compile(r"(?<=\d) (?=Hz|ms|%)")
-FIGURES = ("effort mV", "chatter mV", "clipped %", "Ms", "gain margin", "step ns")
+FIGURES = ("effort mV", "chatter mV", "clipped %", "Ms", "gain margin dB", "step ns")
 
 
 class Grid(NamedTuple):
@@ -127,7 +128,7 @@ def _figures(row: Row, *, several: bool) -> list[str]:
         "-" if row.chatter is None else _plain(1e3 * row.chatter, "{:.3g}"),
         f"{100.0 * clipped:.3g}",
         _plain(row.sensitivity, "{:.2f}"),
-        _plain(row.gain_margin, "{:.2f}"),
+        _plain(None if row.gain_margin is None else decibels(row.gain_margin), "{:.1f}"),
         f"{1e9 * row.step_time:.0f}",
     ]
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..._support.statistics import ErrorStatistics
 from ..on_device.latency import latency_of
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ def tracking_text(run: Tracking) -> str:
     lines = [f"{run.reference!r} at {1.0 / run.controller.dt:g} Hz; {run.note}"]
     since = f"from {run.settled:g} s on" if run.settled else "all of it"
     lines.append(f"{since}: {run.metrics}")
+    if not np.array_equal(run.measured, run.displacement):
+        lines.append(f"true, without the sensor's: {ErrorStatistics.__str__(run.score(true=True))}")
     if run.saturated.any():
         lines.append(f"clipped in {100.0 * run.saturated.mean():.1f} % of the samples")
     if run.periods:

@@ -16,13 +16,16 @@ from ..._support.display.plot_style import (
     plain_log_ticks,
     whole,
 )
+from ..._support.statistics import ErrorStatistics
 from ..._support.units import shown_unit
+from ..tuning.structures import gains_of
 from ..tuning.tuned import motion_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
     from ..controller.controller import Controller
+    from ..laws.pid import Pid
     from ..parts.filters import Filter
     from ..parts.repetitive import Repetitive
     from ..tuning.schedule import Schedule
@@ -51,7 +54,10 @@ def tuned_text(tuned: Tuned) -> str:
             "something learns"
         )
     word = "contour error " if len(gains) > 1 else ""
-    lines += [f"{motion_of(run)!r}: {word}{run.metrics}" for run in tuned.runs]
+    for run in tuned.runs:
+        lines.append(f"{motion_of(run)!r}: measured {word}{run.metrics}")
+        lines.append(f"  true {word}{ErrorStatistics.__str__(run.score(true=True))}")
+    lines += _bandwidths(tuned)
     lines.append(f"over {len(tuned.plants)} plants:")
     lines += [f"  {one}" for one in tuned.kept]
     active = "; ".join(tuned.active_constraints)
@@ -102,23 +108,46 @@ def _shown(tuned: Tuned) -> tuple[float, str]:
     return (1e6, "um") if tuned.unit == "m" else (1.0, tuned.unit)
 
 
+def _bandwidths(tuned: Tuned) -> list[str]:
+    """Write the bandwidth of the feedback, of each axis."""
+    axes = "xy" if len(tuned.bandwidths) > 1 else [""]
+    return [
+        f"{axis}{': ' if axis else ''}bandwidth {value:.3g} Hz"
+        for axis, value in zip(axes, tuned.bandwidths, strict=True)
+        if value is not None
+    ]
+
+
 def _parts(controller: Controller) -> str:
     """Write the gains of a controller with their units."""
     unit, scale = shown_unit(controller.drive_unit)
     text = []
     law = controller.feedback
     if law is not None and law.info.name == "pid":
-        pid = law._pid
-        text.append(
-            f"PID: kp {1e-6 * scale * pid.kp:.4g} {unit}/um, ti {1e3 * pid.ti:.4g} ms, "
-            f"td {1e3 * pid.td:.4g} ms"
-        )
+        text.append(_pid_text(law._pid, controller.dt, unit, 1e-6 * scale))
     elif law is not None:
         text.append(repr(law))
     text += [_filter_text(one) for one in controller.filters]
     if controller.repetitive is not None:
         text.append(_repetitive_text(controller.repetitive, unit, scale))
     return "\n".join(text) or "no feedback"
+
+
+def _pid_text(pid: Pid, dt: float, unit: str, per_um: float) -> str:
+    """Write the gains, without a part that vanishes; times only from a sampling interval on."""
+    gains = gains_of(pid, dt)
+    shown = {}
+    if gains.kp is not None:
+        shown["kp"] = f"{per_um * gains.kp:.4g} {unit}/um"
+    if gains.ti is not None:
+        shown["ti"] = f"{1e3 * gains.ti:.4g} ms"
+    if gains.ki is not None:
+        shown["ki"] = f"{per_um * gains.ki:.4g} {unit}/(um s)"
+    if gains.ti is not None and gains.td is not None:
+        shown["td"] = f"{1e3 * gains.td:.4g} ms"
+    elif gains.kd is not None:
+        shown["kd"] = f"{per_um * gains.kd:.4g} {unit} s/um"
+    return f"{gains.name}: " + ", ".join(f"{name} {value}" for name, value in shown.items())
 
 
 def _filter_text(part: Filter) -> str:
