@@ -459,7 +459,10 @@ impl Tuning<'_> {
         all.chunks(motions).fold((0.0, excess), |(cost, excess), own| {
             let (figure, beyond) = self.figure_of(own, excess);
             // Also where it is not a number.
-            (if figure <= cost { cost } else { figure }, if beyond <= excess { excess } else { beyond })
+            (
+                if figure <= cost { cost } else { figure },
+                if beyond <= excess { excess } else { beyond },
+            )
         })
     }
 
