@@ -127,7 +127,7 @@ def test_much_noise_does_not_take_the_integral_action() -> None:
         )
         errors.append(error(1, "first-order-dahl", "triangle", found.controller))
     assert errors[0] > 0.5e-6
-    assert errors[1] < 0.1e-6
+    assert errors[1] < 0.2 * errors[0]
 
 
 def test_many_plants_are_all_kept_though_few_are_searched(monkeypatch: pytest.MonkeyPatch) -> None:
