@@ -65,8 +65,8 @@ class Noise(Result):
     """
 
     views: ClassVar[Mapping[str, str]] = {
-        "summary": "identification.views.sensor_noise_report:noise_text",
-        "plot": "identification.views.sensor_noise_plot:plot_noise",
+        "summary": "identification.views.experiments.sensor_noise_report:noise_text",
+        "plot": "identification.views.experiments.sensor_noise_plot:plot_noise",
     }
 
     data: Dataset

@@ -119,10 +119,10 @@ class StepResult(Result):
     """
 
     views: ClassVar[Mapping[str, str]] = {
-        "summary": "identification.views.step_report:step_text",
-        "plot": "identification.views.step_plot:plot_step_result",
-        "step": "identification.views.step_plot:plot_step",
-        "spectrum": "identification.views.step_plot:plot_spectrum",
+        "summary": "identification.views.experiments.step_report:step_text",
+        "plot": "identification.views.experiments.step_plot:plot_step_result",
+        "step": "identification.views.experiments.step_plot:plot_step",
+        "spectrum": "identification.views.experiments.step_plot:plot_spectrum",
     }
 
     readings: StepReadings

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._support.display.plot_style import (
+from ...._support.display.plot_style import (
     RECORDED,
     SIMULATED,
     heading,
@@ -16,12 +16,12 @@ from ..._support.display.plot_style import (
     plain_log_ticks,
     whole,
 )
-from ..._support.units import best_length_unit
+from ...._support.units import best_length_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
 
-    from ..experiments.sensor_noise import Noise
+    from ...experiments.sensor_noise import Noise
 
 __all__ = ["plot_noise"]
 

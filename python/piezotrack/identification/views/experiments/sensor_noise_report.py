@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..experiments.sensor_noise import Noise
+    from ...experiments.sensor_noise import Noise
 
 __all__ = ["noise_text"]
 

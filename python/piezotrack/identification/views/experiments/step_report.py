@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..._support.display.table import Column, Table
-from ..._support.units import drive_text, of_drive, shown_unit
+from ...._support.display.table import Column, Table
+from ...._support.units import drive_text, of_drive, shown_unit
 
 if TYPE_CHECKING:
-    from ..experiments.step_response import StepResult
+    from ...experiments.step_response import StepResult
 
 __all__ = ["step_text"]
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._support.arguments import expect
-from ..._support.display.plot_style import (
+from ...._support.arguments import expect
+from ...._support.display.plot_style import (
     LEVEL,
     MARKS,
     RECORDED,
@@ -17,15 +17,15 @@ from ..._support.display.plot_style import (
     panels,
     whole,
 )
-from ..._support.units import best_length_unit, drive_text, shown_unit
-from ...errors import ParameterError
-from ..experiments.step_response import StepResult
+from ...._support.units import best_length_unit, drive_text, shown_unit
+from ....errors import ParameterError
+from ...experiments.step_response import StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from ..experiments.step_response import StepTrace
+    from ...experiments.step_response import StepTrace
 
 __all__ = ["plot_spectrum", "plot_step", "plot_step_result"]
 

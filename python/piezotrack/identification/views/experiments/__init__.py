@@ -1,0 +1,1 @@
+"""Views of experiments: a step, the noise of a sensor."""
