@@ -8,10 +8,17 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from piezotrack.control.on_device import latency
 
 PLAYS = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(5e-7,))
 LIMITS = (0.0, 75.0)
 LINE = pt.triangle(frequency=2.0, low=10e-6, high=60e-6, duration=1.0)
+
+
+@pytest.fixture(autouse=True)
+def _a_short_measurement_of_the_latency(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(latency, "FEWEST", 5)
+    monkeypatch.setattr(latency, "TICKS", 5)
 
 
 def stage(offset: float, noise: float = 0.0) -> pt.VirtualStage:
@@ -72,20 +79,20 @@ class Counting(pt.hardware.VirtualDevice):
 
     def __init__(self) -> None:
         super().__init__(stage(0.0, noise=20e-9), limits=LIMITS)
-        self.held: list[float] = []
+        self.put_out: list[float] = []
 
     def hold(self, volts: float) -> None:
-        self.held.append(volts)
+        self.put_out.append(volts)
         super().hold(volts)
 
 
 def test_a_slow_loop_is_led_to_rest_in_small_steps() -> None:
     there = Counting()
-    slow = replace(controller(feedback=pt.Pid.from_um(kp=0.02, ti=0.06)), dt=0.2)
+    slow = replace(controller(feedback=pt.Pid.from_um(kp=0.02, ti=0.3)), dt=0.2)
     run = pt.track(there, slow, "sine:0.5Hz,10..60um,1.2s", unstable=True)
     assert run.voltage[-1] > 30.0
-    steps = np.abs(np.diff(there.held[there.held.index(run.voltage[-1]) :]))
-    assert there.held[-1] == 0.0
+    steps = np.abs(np.diff(there.put_out[there.put_out.index(run.voltage[-1]) :]))
+    assert there.put_out[-1] == 0.0
     # Half a second from there, as fast as the device answers, not in three steps of the loop.
     assert steps.max() < 0.1 * run.voltage[-1]
 
