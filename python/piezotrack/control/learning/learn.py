@@ -19,8 +19,8 @@ from ...references.parse import reference_of
 from ..controller.controller import Controller
 from ..loop.preconditions import check_drive_unit
 from ..loop.run import Run
-from ..on_device.playing import check_playable
-from ..plant import plant_of, plant_of_inverse, timing_on
+from ..on_device.playing import check_playable, shift_of
+from ..plant import plant_of, plant_of_inverse, shifted, simulated_rest, timing_on
 from ..timing import Timing
 from .iterative_learning import IterativeLearning
 from .trials import PlayedTrials, SimulatedTrials
@@ -197,6 +197,7 @@ def learn(
     change_weight: float = 0.01,
     noise: float | None = None,
     rest: float | None = None,
+    offset: float | None = None,
     beyond_reach: bool = False,
     progress: Callable[[IterativeLearning], None] | None = None,
 ) -> Learning:
@@ -240,6 +241,8 @@ def learn(
     rest : float, optional
         Voltage of a device before and after each trial [V]; default 0 V, or the limit nearest to
         it.
+    offset : float, optional
+        Reading of the stage at rest [m], as of `track`.
     progress : callable, optional
         Called with the learner before the first trial and after each.
 
@@ -278,6 +281,11 @@ def learn(
     # What is behind a device is what its model says.
     behind = known if isinstance(stage, Device) else stage
     plant = plant_of(behind)
+    shift = shift_of(
+        controller, offset, home if isinstance(stage, Device) else simulated_rest(plant)
+    )
+    if shift and not isinstance(stage, Device):
+        plant = shifted(plant, shift)
     learner = IterativeLearning(
         known,
         reference,
@@ -304,7 +312,7 @@ def learn(
     }
     runs: Trials
     if isinstance(stage, Device):
-        runs = PlayedTrials(device=stage, rest=home, learner=learner, **periods)
+        runs = PlayedTrials(device=stage, rest=home, shift=shift, learner=learner, **periods)
     else:
         timing = timing_on(plant, timing, controller.limits)
         runs = SimulatedTrials(plant=plant, learner=learner, timing=timing, **periods)
