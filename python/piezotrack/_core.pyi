@@ -473,6 +473,7 @@ def tune(
     margins: tuple[float, float, float, float],
     axes: Sequence[SoughtController],
     tasks: Sequence[Task | PathTask],
+    stages: int,
     starts: Sequence[Sequence[float]],
 ) -> dict[str, Any]: ...
 def tuning_costs(
@@ -481,6 +482,7 @@ def tuning_costs(
     margins: tuple[float, float, float, float],
     axes: Sequence[SoughtController],
     tasks: Sequence[Task | PathTask],
+    stages: int,
     places: Sequence[Sequence[float]],
 ) -> list[tuple[float, float]]: ...
 
