@@ -16,6 +16,7 @@ from .goal import Goal
 from .margins import NamedPlant, plants_of
 from .model_set.searched import AxisSearch, SearchedSet
 from .starts import simc
+from .structures import gains_of
 from .tuned import MarginReport
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ __all__ = ["Solution", "search_at"]
 SLACK = 0.003
 # Searches with more and more in reserve.
 ROUNDS = 8
+# By how much the cost may grow where an integral time below the interval is replaced.
+SIMILAR = 1.02
 # Budget of the search for gains from margins alone that a search along references begins with.
 ALONE = {"particles": 24, "iterations": 12}
 
@@ -128,11 +131,42 @@ def search_at(problem: TuningProblem, dt: float) -> Solution:
             worst, grown = models.take_stage(outcome["settings"], outcome["cost"])
             outcome["cost"] = worst
             if not grown:
-                return solution
+                return _entered(problem, models, solution)
         elif not models.take_plants(beyond):
             reserve *= 1.0 + 1.2 * (solution.excess - 1.0)
             rounds += 1
     assert solution is not None
+    return solution
+
+
+def _entered(problem: TuningProblem, models: SearchedSet, solution: Solution) -> Solution:
+    """Take integral times from the sampling interval on, or proportional parts that vanish.
+
+    Of a PID whose integral time is below the interval, that becomes the interval, or the
+    proportional part becomes the least: what costs less, with the margins kept, and not more than
+    `SIMILAR`.
+    """
+    for k, axis in enumerate(solution.axes):
+        settings = dict(solution.outcome["settings"][k])
+        pid = axis.box.parts(settings).feedback._pid
+        if axis.box.law != "pid" or pid is None:
+            continue
+        gains = gains_of(pid, axis.box.dt)
+        if gains.kp is None or gains.ti is not None or gains.ki is None:
+            continue
+        least = next(low for name, low, *_ in axis.box.ranges if name == "kp")
+        before = models.cost(solution.outcome["settings"])[1]
+        found = [(SIMILAR, solution)]
+        for kp in (settings["ki"], least):
+            outcome = dict(solution.outcome)
+            outcome["settings"] = list(solution.outcome["settings"])
+            outcome["settings"][k] = list({**settings, "kp": kp}.items())
+            excess, cost = models.cost(outcome["settings"])
+            changed, _ = _checked(problem, models, outcome)
+            if excess <= 1.0 and changed.feasible:
+                outcome["cost"] *= cost / before
+                found.append((cost / before, changed))
+        solution = min(found, key=lambda one: one[0])[1]
     return solution
 
 

@@ -117,6 +117,18 @@ class SearchedSet:
             starts=starts,
         )
 
+    def cost(self, settings: Sequence[Any]) -> tuple[float, float]:
+        """Evaluate settings on the stages that are simulated: excess without margins, and cost."""
+        tasks = [one for i in self.stages for one in self._tasks[i]]
+        return _core.tuning_costs(
+            self._problem,
+            margins=NO_MARGINS,
+            axes=self._sought,
+            tasks=tasks,
+            stages=len(self.stages) if tasks else 1,
+            places=[self.place(settings)],
+        )[0]
+
     def place(self, settings: Sequence[Any]) -> list[float]:
         """Place of the settings of all axes in the unit box."""
         pairs = zip(self.axes, settings, strict=True)
