@@ -8,7 +8,7 @@ import numpy as np
 
 from piezotrack import _core
 from piezotrack.control.tuning import search as tuning_search
-from piezotrack.control.tuning.motions import tasks_of
+from piezotrack.control.tuning.model_set.motions import tasks_of
 from piezotrack.control.tuning.problem import TuningProblem
 
 if TYPE_CHECKING:
@@ -47,10 +47,12 @@ class Cost:
         (dt,) = self.problem.intervals
         axes = [tuning_search._axis_search(self.problem, one, dt) for one in self.problem.axes]
         learns = any(one.box.period is not None for one in axes)
+        tasks = tasks_of(self.problem, [one.base for one in axes], learns)
         self.given: dict[str, Any] = {
             "margins": tuning_search._with_reserve(self.problem.margins, 1.0),
-            "axes": [one._core for one in axes],
-            "tasks": tasks_of(self.problem, [one.base for one in axes], learns),
+            "axes": [one.sought() for one in axes],
+            "tasks": [one for stage in tasks for one in stage],
+            "stages": len(tasks),
         }
         self.coordinates = sum(len(one.box.ranges) for one in axes)
         self.evaluated = 0

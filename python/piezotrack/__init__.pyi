@@ -23,6 +23,7 @@ from .control.parts.filters import LowPass as LowPass
 from .control.parts.filters import Notch as Notch
 from .control.parts.repetitive import Repetitive as Repetitive
 from .control.running.track import track as track
+from .control.running.zero import zero as zero
 from .control.timing import Timing as Timing
 from .control.tuning.goal import Goal as Goal
 from .control.tuning.goal import TuningSearch as TuningSearch

@@ -475,6 +475,7 @@ def tune(
     margins: tuple[float, float, float, float],
     axes: Sequence[SoughtController],
     tasks: Sequence[Task | PathTask],
+    stages: int,
     starts: Sequence[Sequence[float]],
 ) -> dict[str, Any]: ...
 def tuning_costs(
@@ -483,6 +484,7 @@ def tuning_costs(
     margins: tuple[float, float, float, float],
     axes: Sequence[SoughtController],
     tasks: Sequence[Task | PathTask],
+    stages: int,
     places: Sequence[Sequence[float]],
 ) -> list[tuple[float, float]]: ...
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import socket
+import time
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -49,6 +50,46 @@ def client(server: GcsServer) -> Iterator[Client]:
             yield connected
         finally:
             connected.close()
+
+
+@pytest.mark.parametrize(
+    ("abandoned", "running", "voltage"),
+    [("runs", "0x1", (5.0, 20.0)), ("stops", "0x0", (5.0, 20.0)), ("rests", "0x0", (0.0, 0.0))],
+)
+def test_a_wave_whose_client_has_gone(
+    abandoned: Any, running: str, voltage: tuple[float, float]
+) -> None:
+    """The wave goes from 10 to 15 V and back for ever; another client looks at what is left."""
+    with GcsServer(quiet_stage(), speed=100.0, abandoned=abandoned) as server:
+        with client(server) as peer:
+            peer.send("SVA 1 10\nWAV 1 X LIN 2000 5 10 2000 0 0\nWSL 1 1\nWGC 1 0\nWGO 1 1\n\x09")
+            assert peer.answer() == "0x1\n"
+        with client(server) as other:
+            seen = []
+            for _ in range(200):
+                other.send("\x09VOL? 1\n")
+                answers = [other.answer().strip() for _ in range(2)]
+                seen.append((answers[0], float(answers[1].partition("=")[2])))
+                if len(seen) > 20 and seen[-1] == seen[-10]:
+                    break
+                time.sleep(0.005)
+        assert seen[-1][0] == running
+        low, high = voltage
+        assert low <= seen[-1][1] <= high
+        # On its way to rest the output has been between.
+        assert len({volts for _, volts in seen}) > (1 if abandoned == "runs" else 0)
+
+
+def test_one_client_that_goes_does_not_end_the_wave_of_another() -> None:
+    with GcsServer(quiet_stage(), speed=100.0, abandoned="rests") as server, client(server) as peer:
+        peer.send("SVA 1 10\nWAV 1 X LIN 2000 5 10 2000 0 0\nWSL 1 1\nWGC 1 0\nWGO 1 1\n\x09")
+        assert peer.answer() == "0x1\n"
+        with client(server) as other:
+            other.send("POS? 1\n")
+            other.answer()
+        time.sleep(0.1)
+        peer.send("\x09")
+        assert peer.answer() == "0x1\n"
 
 
 def test_commands_are_cut_where_they_end(server: GcsServer) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import piezotrack as pt
@@ -42,6 +43,22 @@ def test_the_c_of_a_file_is_that_of_the_controller() -> None:
     assert document["state_bytes"] == 68
     assert document["bound"] == pytest.approx(1.5e-3)
     assert Path("c/x_axis.c").read_bytes() != before
+
+
+def test_a_table_beyond_the_limits_is_told() -> None:
+    """At 5 um the settled loop of this stage needs less than 0 V."""
+    controller = save(feedforward=PLAYS.inverse(), limits=(5.0, 75.0))
+    low = ("--reference", "sine:0.5Hz,5..60um,4s", "--to", "json", "--json", "--out")
+    note = json.loads(ran("export", "loop.json", *low, "low"))["note"]
+    reference = pt.sine(frequency=0.5, low=5e-6, high=60e-6, duration=4.0)
+    assert controller.feedforward is not None
+    table = controller.feedforward.table(reference, 0.02, limits=controller.limits)
+    assert table.min() < 5.0
+    assert f"goes from {table.min():.4g} to {table.max():.4g} V" in note
+    assert f"5 to 75 V, in {np.sum(table < 5.0)} of {table.size} samples" in note
+    assert note in ran("export", "loop.json", *low[:4], "--out", "again")
+    high = ("--reference", "sine:0.5Hz,40..60um,4s", *low[2:])
+    assert json.loads(ran("export", "loop.json", *high, "high"))["note"] == ""
 
 
 @needs_gcc

@@ -284,11 +284,31 @@ def test_a_model_is_tracked_with_another_model_as_the_stage() -> None:
     assert report()["stage"] == "other.json"
 
 
+@pytest.mark.usefixtures("_no_pictures")
+def test_a_controller_meets_a_stage_with_another_zero() -> None:
+    written_controller()
+    known = pt.load("dahl.json")
+    replace(known, offset=known.offset - 112e-6).save("low.json")
+    course = ("track", "controller.json", "--reference", "sine:0.5Hz,10..60um,6s")
+    ran(*course)
+    alike = report()["metrics"]
+    low = (*course, "--overwrite", "--stage", "low.json")
+    said = refusal(*low)
+    assert "only because the zeros differ: the stage rests at " in said
+    assert ": expected --zero, with which readings count as in the model" in said
+    ran(*low, "--zero")
+    assert report()["metrics"] == pytest.approx(alike, abs=1e-12)
+    # Two models, both from where they begin.
+    both = ("track", "dahl.json", *course[2:], "--stage", "low.json", "--overwrite")
+    assert "--zero" in refusal(*both)
+    assert "zeroed" in ran(*both, "--zero")
+
+
 def test_a_controller_file_has_gains_of_its_own() -> None:
     written_controller()
     course = ("track", "controller.json", "--reference", COURSE)
     assert "--kp has no effect with a controller file" in refusal(*course, "--kp", "0.1")
-    assert "--zero has no effect without a model file" in refusal(*course, "--zero")
+    assert "--zero has no effect without --stage" in refusal(*course, "--zero")
     loop(feedback=PID).save("alone.json")
     said = refusal("track", "alone.json", "--reference", COURSE)
     assert said.startswith("--stage is missing: expected a model file")

@@ -58,7 +58,8 @@ def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> Non
     assert [one["name"] for one in loaded.provenance["design"]["kept"]]
     document = report()
     assert document["format"] == "piezotrack-tuning"
-    assert [one["kind"] for one in document["filters"]] == ["LowPass"]
+    # A low-pass that costs more than it saves is left out.
+    assert {one["kind"] for one in document["filters"]} <= {"LowPass"}
     known = pt.load("dahl.json")
     loop = controller(document, feedforward=known.inverse())
     # The loop that a person makes of the file, judged without the tuning.
@@ -79,7 +80,7 @@ def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> Non
     kept = {one["name"]: one["value"] for one in document["kept"]}
     worst = max(one.sensitivity for one in (margins.low, margins.middle, margins.high))
     assert kept["sensitivity"] == pytest.approx(worst)
-    for words in ("PID: kp ", "low-pass: ", "active constraints: ", "  results/tuning.json\n"):
+    for words in ("ki ", "active constraints: ", "  results/tuning.json\n"):
         assert words in printed
 
 

@@ -193,6 +193,51 @@ def test_a_growing_error_ends_it_with_the_best_table() -> None:
     assert np.array_equal(learning.table, learning.tables[learning.best])
 
 
+def test_a_slow_loop_is_given_the_periods_that_it_takes_or_said_not_to_have_settled() -> None:
+    """An integrator that takes seconds, on a stage of 1.5 times the gain of its model."""
+    stage = pt.VirtualStage.of(
+        replace(PLAYS, linear=1.5e-6, weights=tuple(1.5 * one for one in PLAYS.weights)),
+        noise=5e-9, seed=1,
+    )  # fmt: skip
+    law = pt.Pid(kp=2e3, ti=0.01)
+    loop = replace(OPEN, feedforward=PLAYS.inverse(), feedback=law)
+    motion = pt.sine(frequency=5.0, low=10e-6, high=45e-6, duration=1.0)
+    options: Any = {"model": PLAYS, "trials": 12}
+    early = pt.learn(stage, motion, loop, settle=3, **options)
+    assert early.stopped == "not settled"
+    assert early.errors[early.best] > 5e-6
+    # A transient of that time constant, from one period to the next.
+    last = early.trials[-1]
+    gain = pt.check_loop(stage, loop).middle.gain
+    share = 1.0 - math.exp(-0.2 * law.kp * gain / law.ti)
+    assert abs(last.unsettled) == pytest.approx(share * last.rms_error, rel=0.3)
+    # The noise is that of the sensor, not the transient.
+    assert last.noise == pytest.approx(5e-9 / math.sqrt(2.0), abs=8e-9)
+    assert "has not settled when it is recorded" in early.summary()
+    whole = pt.learn(stage, motion, loop, **options)
+    assert whole.stopped in ("no change", "noise")
+    assert whole.errors[whole.best] < 50e-9
+    assert whole.trials[-1].unsettled == 0.0
+
+
+@pytest.mark.parametrize("bandwidth", [math.inf, 20.0], ids=["white", "below 20 Hz"])
+def test_noise_is_not_taken_for_a_transient(bandwidth: float) -> None:
+    stage = pt.VirtualStage.of(PLAYS, noise=20e-9, noise_bandwidth=bandwidth, seed=4)
+    learner = pt.control.IterativeLearning(PLAYS, SINE, OPEN, mode_scales=1.0)
+    n = learner.t.size
+    record = stage.record(np.full(n * 120, 10.0), DT, hold="zoh").y[-100 * n :]
+    level = learner.desired - learner.desired.mean()
+    found = []
+    for pair in record.reshape(50, 2, n):
+        learner.update(level + pair)
+        found.append(learner.trials[-1].unsettled)
+    assert np.count_nonzero(found) <= 1
+    # A drift of the sensor of a few times its noise is seen.
+    drifting = pair + np.array([[0.0], [60e-9]])
+    learner.update(level + drifting)
+    assert learner.trials[-1].unsettled == pytest.approx(60e-9, abs=30e-9)
+
+
 def test_records_of_several_periods_show_what_does_not_repeat() -> None:
     learner = pt.control.IterativeLearning(LINEAR, SINE, OPEN)
     noise = 5e-9 * np.random.default_rng(1).standard_normal((50, 100))

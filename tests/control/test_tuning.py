@@ -17,6 +17,7 @@ import pytest
 import piezotrack as pt
 from piezotrack.control import MarginReport
 from piezotrack.control.tuning import search
+from piezotrack.control.tuning.model_set.searched import SearchedSet
 from piezotrack.control.tuning.structures import gains_of
 
 if TYPE_CHECKING:
@@ -237,6 +238,69 @@ def test_a_gain_that_vanishes_is_left_out(pid: pt.Pid, name: str, present: set[s
     assert np.abs(left - (p * q + i + d * q**2)).max() < 0.01 * (i + 4.0 * d + p)
 
 
+def short_lag(**options: Any) -> tuple[pt.VirtualStage, pt.control.Tuned]:
+    """A lag far shorter than the delay: the best law integrates, and noise needs no filter."""
+    plays = pt.PrandtlIshlinskiiStage(
+        linear=1e-6, thresholds=(5.0,), weights=(5e-7,), time_constant=1e-3
+    )
+    stage = pt.VirtualStage.of(plays, noise=20e-9, seed=1)
+    line = pt.triangle(frequency=1.0, low=5e-6, high=42e-6, duration=3.0)
+    tuned = pt.tune(
+        stage, line, dt=1e-3, limits=LIMITS, feedforward=plays.inverse(),
+        timing=pt.Timing(delay=0.5e-3), search=pt.TuningSearch(particles=16, iterations=10),
+        **options,
+    )  # fmt: skip
+    return stage, tuned
+
+
+def test_an_integrator_is_tuned_as_one_and_the_true_error_is_beside_the_measured() -> None:
+    stage, tuned = short_lag()
+    controller = tuned.controller
+    assert controller.filters == ()
+    assert isinstance(controller.feedback, pt.Pid)
+    gains = gains_of(controller.feedback, controller.dt)
+    assert gains.kp is None
+    assert gains.ti is None
+    assert gains.ki is not None
+    assert tuned.document()["gains"]["ki_V_per_um_s"] == pytest.approx(1e-6 * gains.ki)
+    text = str(tuned)
+    assert text.startswith("I")
+    assert "kp" not in text
+    # The margins and the bandwidth are those of what is left.
+    report = pt.check_loop(stage, controller, delay=0.5e-3)
+    worst = {one.name: one.value for one in tuned.kept}
+    assert worst["sensitivity"] == pytest.approx(report.high.sensitivity, rel=1e-6)
+    assert tuned.bandwidths == (report.middle.bandwidth,)
+    # Two thirds of what is measured is noise, which the stage does not move by.
+    (run,) = tuned.document()["references"]
+    assert run["true_metrics"]["rms_error"] < 0.6 * run["metrics"]["rms_error"]
+    assert f"true max {1e6 * run['true_metrics']['max_error']:.3f} um" in text
+
+
+@pytest.mark.parametrize("ratio", [0.9, 0.1])
+def test_an_integral_time_below_the_interval_is_replaced(
+    ratio: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the search gives is changed so that the integral time is a part of the interval."""
+    search_for = SearchedSet.search
+
+    def below(self: Any, *arguments: Any, **options: Any) -> dict[str, Any]:
+        outcome = search_for(self, *arguments, **options)
+        for one in outcome["settings"]:
+            settings = dict(one)
+            settings["kp"] = ratio * settings["ki"]
+            one[:] = list(settings.items())
+        return outcome
+
+    monkeypatch.setattr(SearchedSet, "search", below)
+    _, tuned = short_lag(parts="pid")
+    pid = tuned.controller.feedback
+    assert isinstance(pid, pt.Pid)
+    gains = gains_of(pid, 1e-3)
+    assert gains.kp is None or pid.ti == pytest.approx(1e-3)
+    assert max(one.share for one in tuned.kept) <= 1.01
+
+
 def test_shares_of_what_was_asked_for() -> None:
     assert MarginReport("gain margin", 4.0, 2.0, "low gain").share == 0.5
     assert MarginReport("sensitivity", 1.5, 2.0, "low gain").share == 0.75
@@ -328,7 +392,9 @@ def test_a_model_of_the_set_that_cannot_follow_is_named() -> None:
     weak = pt.stages.PrandtlIshlinskiiStage(
         linear=0.5e-6, thresholds=(10.0,), weights=(0.1e-6,), time_constant=1e-3
     )
-    words = "model 2: reference is 100 um .* expected 0 to 44 um .* largest_saturation=0.5 or more"
+    words = (
+        "model 2: reference is 100 um .* expected .* to 43.01 um .*largest_saturation=0.5 or more"
+    )
     with pytest.raises(pt.ParameterError, match=words):
         pt.tune([published_stage(), weak], motion(10.0), dt=0.02, limits=LIMITS, **QUICK)
 

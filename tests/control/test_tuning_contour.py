@@ -10,7 +10,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack import _core
-from piezotrack.control.tuning.motions import tasks_of
+from piezotrack.control.tuning.model_set.motions import tasks_of
 from piezotrack.control.tuning.problem import TuningProblem
 
 LIMITS = (0.0, 75.0)
@@ -26,10 +26,10 @@ TIMING = pt.Timing(delay=1e-3)
 
 
 def problem(stage: pt.XYStage, path: pt.XYReference) -> TuningProblem:
-    options: dict[str, Any] = dict.fromkeys(("feedforward", "parts", "margins", "spread", "search"))
+    options: dict[str, Any] = dict.fromkeys(("feedforward", "parts", "margins", "search"))
     return TuningProblem.checked(
         stage=stage, reference=path, law="pid", filters=(), threads=0, timing=TIMING,
-        goal=pt.Goal(largest_saturation=1.0), **LOOP, **options,
+        goal=pt.Goal(largest_saturation=1.0), spread=pt.Spread(offset=0.0), **LOOP, **options,
     )  # fmt: skip
 
 
@@ -46,7 +46,7 @@ def test_the_contour_error_of_the_search_is_that_of_a_full_simulation(
             frequencies=(0.4, 0.2), sizes=(15e-6, 20e-6), centre=(50e-6, 50e-6)
         )
     loops = published(), replace(published(), feedback=pt.Pid(kp=0.08e6, ti=0.01, td=0.02))
-    (task,) = tasks_of(problem(stage, path), loops, repeats=False)
+    ((task,),) = tasks_of(problem(stage, path), loops, repeats=False)
     assert isinstance(task, _core.PathTask)
     ((rms, largest, *_),) = task.figures([(loops[0]._core, loops[1]._core)], 1)
     full = pt.contour(stage, loops, path, timing=TIMING).metrics

@@ -214,6 +214,7 @@ fn the_integral_gain_from_margins_alone_is_the_known_one() {
     let tuning = Tuning {
         axes: vec![axis],
         tasks: Vec::new(),
+        stages: 1,
         required: Requirements { phase_margin: 0.0, gain_margin: 1.001, ..required() },
         aim: Aim::Disturbance,
         effort: 0.0,
@@ -254,6 +255,7 @@ fn a_search_beats_the_published_gains_and_keeps_its_margins() {
     let tuning = Tuning {
         axes: vec![axis],
         tasks: vec![Judge::Axis(task)],
+        stages: 1,
         required: required(),
         aim: Aim::Rms,
         effort: 0.0,

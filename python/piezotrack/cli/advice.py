@@ -45,6 +45,7 @@ REMEDIES = [
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
     # An option of the commands that come after `info`.
     (r"\bfit\.zeroed\(\)", "--zero", "--zero"),
+    (r"\boffset=pt\.zero\(stage\)", "--zero", "--zero"),
     (r"\blog\.decimate\((\w+)\)", r"--decimate \1", "--displacement"),
 ]
 # Where a command has no options for columns, the header of the file has to say it.
@@ -101,6 +102,7 @@ def as_options(error: object) -> str:
         text = re.sub(r"; missing='drop' leaves .*", "", text)
     if "--zero" not in known:
         text = re.sub(r"; fit\.zeroed\(\) .*", "", text)
+        text = re.sub(r"offset=pt\.zero\(stage\), .*", "models of one zero", text)
     text = text.replace(", or largest_saturation=0.5 or more", "")
     for python, words, needed in REMEDIES:
         if needed in known:

@@ -124,7 +124,8 @@ Zero = Annotated[
     typer.Option(
         "--zero",
         help="Displacements from the beginning of the record on: less what its sensor reads there, "
-        "before the drive moves. Default as recorded.",
+        "before the drive moves. Of a device or another stage, from where it is at rest. Default "
+        "as recorded.",
     ),
 ]
 Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]

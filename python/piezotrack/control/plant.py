@@ -32,6 +32,8 @@ __all__ = [
     "lowest_settled_displacement",
     "plant_of",
     "plant_of_inverse",
+    "shifted",
+    "simulated_rest",
     "timing_on",
 ]
 
@@ -68,6 +70,18 @@ def plant_of_inverse(inverse: Inverse, **parts: Any) -> VirtualStage:
     """
     plant = VirtualStage.of(inverse.stage, delay=inverse.delay, **parts)
     return replace(plant, sensor=replace(plant.sensor, offset=inverse.offset))
+
+
+def simulated_rest(stage: VirtualStage) -> float:
+    """Return the voltage at which a stage rests [V]: 0 V, or the amplifier's nearest to it."""
+    low, high = stage.amplifier.limits
+    return min(max(0.0, low), high)
+
+
+def shifted(stage: VirtualStage, shift: float) -> VirtualStage:
+    """Return a stage whose readings are less by `shift` [m]."""
+    sensor = stage.sensor
+    return replace(stage, sensor=replace(sensor, offset=sensor.offset - shift))
 
 
 def displacement_range(

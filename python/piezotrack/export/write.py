@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from .. import _core
 from .._support.arguments import expect, one_of
 from .._support.files.writing import make_folder, replacing, result_set, write_document
+from .._support.units import shown_unit
 from ..control.controller.controller import Controller
 from ..errors import ParameterError
 from ..references.reference import Reference
@@ -68,7 +69,8 @@ class Exported:
             return f"{text}; {self.note}" if self.note else text
         text = f"state {self.state_bytes} bytes; a step has {self.additions} additions, "
         text += f"{self.multiplications} multiplications, {self.divisions} divisions"
-        return text + ("" if self.bound == 0.0 else f"; within {self.bound:.3g} of the doubles")
+        text += "" if self.bound == 0.0 else f"; within {self.bound:.3g} of the doubles"
+        return f"{text}; {self.note}" if self.note else text
 
 
 def export_files(to: To, name: str) -> list[str]:
@@ -149,13 +151,14 @@ def export_controller(
     single = _core.as_truth("single", single)
     names = export_files(to, name)
     played = feedforward_table(controller, reference, table)
+    note = _clipped(controller, played or [])
     if to == "json":
         if single:
             raise ParameterError("single", "True with to='json'", "False, JSON has doubles")
         document = coefficients_document(controller, played)
         path = write_document(make_folder(folder) / names[0], document)
         left_out = controller.feedforward is not None and played is None
-        return Exported(files=(path,), to=to, note=LEFT_OUT if left_out else "")
+        return Exported(files=(path,), to=to, note=LEFT_OUT if left_out else note)
     if to == "library":
         if single:
             raise ParameterError(
@@ -163,7 +166,7 @@ def export_controller(
             )
         texts = library_sources(controller, name, table=played, reference=reference)
         paths = _written({key: text.encode() for key, text in texts.items()}, folder)
-        return Exported(files=paths, to=to, bound=0.0)
+        return Exported(files=paths, to=to, bound=0.0, note=note)
     if to == "fmu":
         compiler()
     sources = c_sources(controller, name, single=single, table=played, reference=reference)
@@ -179,6 +182,22 @@ def export_controller(
         multiplications=multiplications,
         divisions=divisions,
         bound=sources.bound,
+        note=note,
+    )
+
+
+def _clipped(controller: Controller, table: list[float]) -> str:
+    """Say by how much a table is beyond the limits; empty where it is not."""
+    low, high = controller.limits
+    beyond = sum(not low <= volts <= high for volts in table)
+    if not beyond:
+        return ""
+    unit, scale = shown_unit(controller.drive_unit)
+    least, most, bottom, top = (f"{scale * one:.4g}" for one in (min(table), max(table), low, high))
+    return (
+        f"the table of the feedforward goes from {least} to {most} {unit}, and is clipped to the "
+        f"limits, {bottom} to {top} {unit}, in {beyond} of {len(table)} samples: expected a motion "
+        "that the stage can follow"
     )
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from .device import Device
 
-__all__ = ["lead", "led_back", "terminated"]
+__all__ = ["lead", "led_back", "terminated", "to_rest"]
 
 # Time that the way to a safe voltage takes [s], and between two of its steps.
 RAMP, PAUSE = 0.5, 0.002
@@ -58,7 +58,7 @@ def led_back(device: Device, home: float) -> Iterator[None]:
 
 def _lead_back(device: Device, home: float, error: BaseException) -> None:
     try:
-        _ramp(device, home)
+        to_rest(device, home)
         return
     # Where that does not work, or Ctrl-C comes again: at once.
     except (Exception, KeyboardInterrupt) as failed:
@@ -76,8 +76,11 @@ def _lead_back(device: Device, home: float, error: BaseException) -> None:
     ) from error
 
 
-def _ramp(device: Device, home: float) -> None:
-    """Lead the output to a voltage [V] slowly, from that which the device says is there."""
+def to_rest(device: Device, home: float) -> None:
+    """Lead the output to a voltage [V] slowly, from that which the device says is there.
+
+    In one step where it says none.
+    """
     present = getattr(device, "voltage", math.nan)
     if isinstance(present, float) and math.isfinite(present):
         lead(device, present, home)
@@ -85,14 +88,14 @@ def _ramp(device: Device, home: float) -> None:
         device.hold(home)
 
 
-def lead(device: Device, present: float, home: float, pause: float = PAUSE) -> None:
-    """Lead the output from one voltage to another [V] in half a second, in steps of `pause` [s]."""
+def lead(device: Device, present: float, home: float) -> None:
+    """Lead the output from one voltage to another [V] in half a second, as fast as it answers."""
     low, high = device.limits
     begin, begun = min(max(present, low), high), time.perf_counter()
     while (share := (time.perf_counter() - begun) / RAMP) < 1.0:
         # Between two voltages within the limits, whatever the rounding.
         device.hold(min(max(begin + (home - begin) * share, low), high))
-        time.sleep(pause)
+        time.sleep(PAUSE)
     device.hold(home)
 
 

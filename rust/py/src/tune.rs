@@ -288,6 +288,7 @@ impl Problem {
         margins: MarginNumbers,
         axes: &[PyRef<'_, PySoughtController>],
         tasks: Vec<Judge<'a>>,
+        stages: usize,
     ) -> Tuning<'a> {
         let Self { goal, search, .. } = self;
         Tuning {
@@ -295,6 +296,7 @@ impl Problem {
             required: goal.required(margins),
             aim: goal.aim(tasks.len()),
             tasks,
+            stages,
             effort: goal.effort,
             particles: search.particles,
             iterations: search.iterations,
@@ -369,7 +371,7 @@ impl PySoughtController {
 /// Searches the settings of a controller, or of those of both axes, with margins that may have some
 /// in reserve.
 #[pyfunction]
-#[pyo3(signature = (problem, *, margins, axes, tasks, starts))]
+#[pyo3(signature = (problem, *, margins, axes, tasks, stages, starts))]
 #[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
 fn tune(
     py: Python<'_>,
@@ -377,18 +379,19 @@ fn tune(
     margins: MarginNumbers,
     axes: Vec<PyRef<'_, PySoughtController>>,
     tasks: Vec<AnyTask<'_>>,
+    stages: usize,
     starts: Vec<Vec<f64>>,
 ) -> PyResult<FoundSettings> {
     let judges: Result<Vec<Judge<'_>>> = tasks.iter().map(AnyTask::judge).collect();
     let judges = judges.map_err(|error| raise(&error))?;
-    let tuning = Tuning { starts, ..problem.tuning(margins, &axes, judges) };
+    let tuning = Tuning { starts, ..problem.tuning(margins, &axes, judges, stages) };
     let found = enter_quiet_pool(py, problem.threads, |stop| tuning.search(stop))?;
     Ok(FoundSettings::of(&found))
 }
 
 /// Excess and cost of places of the unit box, as the search ranks them; for benches.
 #[pyfunction]
-#[pyo3(signature = (problem, *, margins, axes, tasks, places))]
+#[pyo3(signature = (problem, *, margins, axes, tasks, stages, places))]
 #[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
 fn tuning_costs(
     py: Python<'_>,
@@ -396,10 +399,11 @@ fn tuning_costs(
     margins: MarginNumbers,
     axes: Vec<PyRef<'_, PySoughtController>>,
     tasks: Vec<AnyTask<'_>>,
+    stages: usize,
     places: Vec<Vec<f64>>,
 ) -> PyResult<Vec<(f64, f64)>> {
     let judges: Result<Vec<Judge<'_>>> = tasks.iter().map(AnyTask::judge).collect();
     let judges = judges.map_err(|error| raise(&error))?;
-    let tuning = problem.tuning(margins, &axes, judges);
+    let tuning = problem.tuning(margins, &axes, judges, stages);
     enter_quiet_pool(py, problem.threads, |stop| tuning.costs(&places, stop))
 }

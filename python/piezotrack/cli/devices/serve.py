@@ -6,8 +6,9 @@ import math
 import threading
 import time
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -34,9 +35,9 @@ PORTS = {"gcs": 50000, "scpi": 5025}
 # Options of the other protocols.
 OTHERS = {
     "gcs": (("prefix", "device"), "with gcs"),
-    "scpi": (("prefix", "device"), "with scpi"),
+    "scpi": (("prefix", "device", "abandoned"), "with scpi"),
     "epics": (
-        ("host", "port"),
+        ("host", "port", "abandoned"),
         "with epics, which listens where EPICS_CAS_INTF_ADDR_LIST and EPICS_CA_SERVER_PORT say",
     ),
 }
@@ -73,6 +74,13 @@ def serve_command(
         typer.Option(help="TCP port; 0 for any free one; default 50000, of scpi 5025."),
     ] = None,
     speed: Annotated[float, typer.Option(help="How much faster than real time it goes.")] = 1.0,
+    abandoned: Annotated[
+        Literal["runs", "stops", "rests"],
+        typer.Option(
+            help="What becomes of a wave of gcs whose client has gone: it runs on, as with a real "
+            "controller, stops where it is, or is led to rest at 0 V."
+        ),
+    ] = "runs",
     prefix: Annotated[
         str | None,
         typer.Option(
@@ -104,7 +112,7 @@ def serve_command(
         return
     stage, within = _stage(model, limits)
     place = PORTS[protocol] if port is None else port
-    serving = _scpi if protocol == "scpi" else _gcs
+    serving = _scpi if protocol == "scpi" else partial(_gcs, abandoned=abandoned)
     with serving(stage, within, host, place, speed) as (address, (low, high)):
         print(f"listening from {low:g} to {high:g} V at {address}", flush=True)
         threading.Event().wait()
@@ -135,10 +143,18 @@ def _timed(stage: VirtualStage, limits: Limits | None, speed: float) -> VirtualD
 
 
 @contextmanager
-def _gcs(stage: VirtualStage, limits: Limits | None, host: str, port: int, speed: float) -> Served:
+def _gcs(
+    stage: VirtualStage,
+    limits: Limits | None,
+    host: str,
+    port: int,
+    speed: float,
+    abandoned: Literal["runs", "stops", "rests"],
+) -> Served:
     from ...adapters.simulators.gcs.server import GcsServer
 
-    with GcsServer(stage, limits=limits, host=host, port=port, speed=speed) as server:
+    options: dict[str, Any] = {"host": host, "port": port, "speed": speed, "abandoned": abandoned}
+    with GcsServer(stage, limits=limits, **options) as server:
         yield server.address, server.limits
 
 

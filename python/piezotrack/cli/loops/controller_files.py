@@ -48,7 +48,6 @@ def stage_of_controller(
     controller: Controller,
     stage: str | None,
     *,
-    zero: bool,
     noise: float,
     bandwidth: float,
     seed: int,
@@ -62,8 +61,6 @@ def stage_of_controller(
     stage : str or None
         A model file, or the name of the stage of the paper; by default the stage that the
         feedforward inverts.
-    zero : bool
-        Whether the displacements of a model file begin at 0.
     noise, bandwidth, seed : float, float, int
         Noise of its sensor [m], bandwidth of its amplifier [Hz], and seed of the noise.
 
@@ -86,7 +83,7 @@ def stage_of_controller(
     if stage == PAPER:
         return VirtualStage.xu_li_2010(seed=seed), None
     if stage is not None:
-        known = known_model(Path(stage), zero=zero)
+        known = known_model(Path(stage), zero=False)
         check_same_drive(known, stage, controller.drive_unit)
         return VirtualStage.of(known, **parts), known
     if controller.feedforward is None:

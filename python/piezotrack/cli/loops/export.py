@@ -132,4 +132,5 @@ def _document(done: Exported) -> dict[str, Any]:
         "multiplications": done.multiplications,
         "divisions": done.divisions,
         "bound": done.bound,
+        "note": done.note,
     }

@@ -132,6 +132,7 @@ def learn_command(
     from ..._support.files.writing import picture_files
     from ...control.controller.controller import Controller
     from ...control.learning.learn import learn
+    from ...control.running.zero import zero as read_zero
     from ...control.timing import Timing
     from ...references.parse import reference_of
 
@@ -169,6 +170,7 @@ def learn_command(
                 cutoff=cutoff,
                 mode_scales=[number("--mode-scales", one) for one in mode_scales.split(",")],
                 rest=rest,
+                offset=read_zero(plant, rest=rest) if zero and device is not None else None,
                 beyond_reach=beyond_reach,
                 progress=None if json or quiet else _show,
             )

@@ -17,7 +17,6 @@ from ..options import (
     Period,
     Quiet,
     Zero,
-    refuse_without_effect,
 )
 from ..output import Output
 from .loop_options import known_model
@@ -31,7 +30,6 @@ __all__ = ["play_command"]
 
 @report_errors
 def play_command(
-    context: typer.Context,
     file: Annotated[
         Path,
         typer.Argument(
@@ -59,10 +57,10 @@ def play_command(
     from ..._support.files.writing import picture_files
     from ...control.controller.load import load_controller
     from ...control.on_device.playing import play
+    from ...control.running.zero import zero as read_zero
     from ...references.parse import reference_of
 
     if rate is None:
-        refuse_without_effect(context, ["zero"], "without --rate: a controller has its zero")
         forward: Controller | Inverse = load_controller(file)
     else:
         forward = known_model(file, zero=zero).inverse()
@@ -70,5 +68,6 @@ def play_command(
     result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     with connected(device) as used:
-        run = play(used, forward, desired, rate=rate, rest=rest)
+        begun = read_zero(used, rest=rest) if zero else None
+        run = play(used, forward, desired, rate=rate, rest=rest, offset=begun)
     result.show(run.summary(), run.document(), run.save(out))

@@ -160,6 +160,7 @@ def track_command(
 ) -> None:
     """Track a reference in closed loop."""
     from ...control.controller.controller import Controller
+    from ...control.running.zero import zero as read_zero
     from ...control.timing import Timing
     from ...references.parse import reference_of
 
@@ -167,7 +168,8 @@ def track_command(
         refuse_without_effect(context, SIMULATED, "with --device")
         desired = reference_of(reference, duration=duration, period=period)
         result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-        _on_device(model, device, desired, result, beyond_reach=beyond_reach, unstable=unstable)
+        free = {"zero": zero, "beyond_reach": beyond_reach, "unstable": unstable}
+        _on_device(model, device, desired, result, **free)
         return
     desired = reference_of(reference, duration=duration, period=period)
     timing = Timing(delay=delay, jitter=jitter)
@@ -184,11 +186,12 @@ def track_command(
     }
     if (loop := controller_in(model)) is not None:
         refuse_without_effect(context, OF_A_CONTROLLER, "with a controller file, which has its own")
-        if stage in (None, PAPER):
-            refuse_without_effect(context, ["zero"], "without a model file as --stage")
-        plant, known = stage_of_controller(loop, stage, zero=zero, **sensor)
+        if stage is None:
+            refuse_without_effect(context, ["zero"], "without --stage")
+        plant, known = stage_of_controller(loop, stage, **sensor)
         name = f"stage: {_stage_name(stage, 'the model of its feedforward')}, controller: {model}"
-        _simulate(result, plant, loop, desired, timing, free, known, name, stage)
+        begun = read_zero(plant) if zero else None
+        _simulate(result, plant, loop, desired, timing, free, known, name, stage, begun)
         return
     settings = Loop(of_model, dt, limits, feedback, kp, ti, td, tt)
     settings.check(context)
@@ -227,6 +230,7 @@ def _simulate(
     known: IdentifiedModel | None,
     name: str,
     stage: str | None,
+    offset: float | None = None,
 ) -> None:
     """Track a reference on a simulated stage; print and write the run."""
     from ..._support.files.writing import picture_files
@@ -234,7 +238,7 @@ def _simulate(
     from ...control.running.track import track
 
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
-    run = track(plant, loop, desired, timing=timing, **free)
+    run = track(plant, loop, desired, timing=timing, offset=offset, **free)
     zeroed = zero_words(known) if known is not None and stage != PAPER else ""
     lines = [f"{name}{zeroed}", run.summary()]
     notes = [] if known is None else drive_notes(known, run)
@@ -262,7 +266,7 @@ OF_A_CONTROLLER = (
 # Those, and options of a simulation.
 SIMULATED = (
     *OF_A_CONTROLLER,
-    *("stage", "zero", "delay", "jitter", "noise_nm", "bandwidth", "seed"),
+    *("stage", "delay", "jitter", "noise_nm", "bandwidth", "seed"),
 )
 
 
@@ -272,6 +276,7 @@ def _on_device(
     desired: Reference,
     result: Output,
     *,
+    zero: bool,
     beyond_reach: bool,
     unstable: bool,
 ) -> None:
@@ -279,12 +284,21 @@ def _on_device(
     from ..._support.files.writing import picture_files
     from ...control.controller.load import load_controller
     from ...control.running.track import track
+    from ...control.running.zero import zero as read_zero
 
     loop = load_controller(file)
     result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     with connected(address) as used:
         try:
-            run = track(used, loop, desired, beyond_reach=beyond_reach, unstable=unstable)
+            begun = read_zero(used) if zero else None
+            run = track(
+                used,
+                loop,
+                desired,
+                offset=begun,
+                beyond_reach=beyond_reach,
+                unstable=unstable,
+            )
         except (DeviceError, Interrupted) as error:
             ended = f"ended: {error}"
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..._support.arguments import check_length, expect, in_range, not_negative, one_of, positive
 from ..._support.arrays import real_array
 from ..._support.messages import quoted
+from ..._support.statistics import sample_noise
 from ...data.dataset import Dataset
 from ...errors import DataError, ParameterError, ShapeError
 from ...references.reference import Reference
@@ -34,6 +35,9 @@ Method = Literal["frequency", "lifted"]
 ABOVE_NOISE = 1.1
 # Trials without a change for the better after which no more is expected, and what counts as one.
 STALLED, BETTER = 4, 0.98
+# Parts of a period whose means show whether records differ as a whole, and how far the mean of the
+# differences is beyond what these scatter by.
+BLOCKS, APART = 8, 6.0
 # The rms of an error, over the smallest so far, from which something must be wrong.
 GROWN = 2.0
 
@@ -50,12 +54,16 @@ class LearningTrial:
         Rms of what does not repeat in that mean [m]; None where it is not known.
     clipped : float
         Share of the samples at which the table is at a limit.
+    unsettled : float
+        Mean of the last record less that of the first [m], where it is beyond the noise: the loop
+        has not settled, or the sensor drifts; 0 elsewhere, and of one record.
     """
 
     rms_error: float
     max_error: float
     noise: float | None
     clipped: float
+    unsettled: float = 0.0
 
     @property
     def repeatable(self) -> float:
@@ -271,7 +279,11 @@ class IterativeLearning:
 
     @property
     def stopped(self) -> str | None:
-        """Why no further trial is needed: "noise", "no change", "grows"; None before."""
+        """Why no further trial is needed; None before.
+
+        ``"noise"``, ``"no change"``, ``"grows"``, or ``"not settled"`` where the error falls no
+        further and the records of the last trial differ as a whole.
+        """
         if not self._trials:
             return None
         last, errors = self._trials[-1], [one.rms_error for one in self._trials]
@@ -282,7 +294,7 @@ class IterativeLearning:
             return "grows"
         late = len(errors) > STALLED
         if late and min(errors[-STALLED:]) > BETTER * min(errors[:-STALLED]):
-            return "no change"
+            return "not settled" if last.unsettled else "no change"
         return None
 
     def update(self, measured: ArrayLike | Dataset | Sequence[Dataset]) -> Array:
@@ -312,26 +324,30 @@ class IterativeLearning:
         error = self._desired - records.mean(axis=0)
         low, high = self._controller.limits
         table = self._tables[-1]
+        unsettled = _moved(records)
         self._trials.append(
             LearningTrial(
                 rms_error=float(np.sqrt(np.mean(error**2))),
                 max_error=float(np.abs(error).max()),
-                noise=self._noise_of(records),
+                noise=self._noise_of(records, level=unsettled == 0.0),
                 clipped=float(np.mean((table <= low) | (table >= high))),
+                unsettled=unsettled,
             )
         )
         learnt = self._rule.after(table - self._feedforward, error)
         self._tables.append(np.clip(self._feedforward + learnt, low, high))
         return self.table
 
-    def _noise_of(self, records: Array) -> float | None:
-        """Rms of what does not repeat in the mean of records [m]."""
+    def _noise_of(self, records: Array, *, level: bool) -> float | None:
+        """Rms of what does not repeat in a mean of records [m], their levels aside if not level."""
         count = records.shape[0]
         if self._noise is not None:
             return self._noise / float(np.sqrt(count))
         if count < 2:
             return None
         apart = records - records.mean(axis=0)
+        if not level:
+            apart = apart - apart.mean(axis=1, keepdims=True)
         return float(np.sqrt(np.sum(apart**2) / ((count - 1) * records.shape[1] * count)))
 
     def _checked(self, measured: ArrayLike | Dataset | Sequence[Dataset]) -> Array:
@@ -368,6 +384,22 @@ class IterativeLearning:
                 "1 m"
             )
         return records
+
+
+def _moved(records: Array) -> float:
+    """Mean of the last record less that of the first [m], or 0 where that is noise.
+
+    It has to be beyond the noise from sample to sample, and stand out of the means of parts of the
+    period, which noise of low frequency moves too.
+    """
+    if records.shape[0] < 2:
+        return 0.0
+    difference = records[-1] - records[0]
+    means = [float(part.mean()) for part in np.array_split(difference, BLOCKS)]
+    mean = float(np.mean(difference))
+    spread = float(np.std(means, ddof=1)) / float(np.sqrt(BLOCKS))
+    beyond = sample_noise(difference) / float(np.sqrt(2.0))
+    return mean if abs(mean) > max(beyond, APART * spread) else 0.0
 
 
 def _check_kinds(

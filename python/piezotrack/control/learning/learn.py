@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -19,8 +20,9 @@ from ...references.parse import reference_of
 from ..controller.controller import Controller
 from ..loop.preconditions import check_drive_unit
 from ..loop.run import Run
-from ..on_device.playing import check_playable
-from ..plant import plant_of, plant_of_inverse, timing_on
+from ..loop.stability import check_loop
+from ..on_device.playing import check_playable, shift_of
+from ..plant import plant_of, plant_of_inverse, shifted, simulated_rest, timing_on
 from ..timing import Timing
 from .iterative_learning import IterativeLearning
 from .trials import PlayedTrials, SimulatedTrials
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 
     from ...identification.fitted.identified_model import IdentifiedModel
     from ...references.reference import Reference
+    from ...stages.virtual import VirtualStage
     from ..loop.tracking import Tracking
     from ..plant import Plant
     from .iterative_learning import LearningTrial, Method
@@ -45,6 +48,8 @@ if TYPE_CHECKING:
 __all__ = ["Learning", "learn"]
 
 MOST_TRIALS = 10_000
+# Periods of a run, at most; those before the record, at least; what is left of a transient then.
+MOST_PERIODS, FEWEST_PERIODS, LEFT = 1000, 2, 1e-4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -62,7 +67,8 @@ class Learning(Result):
     best : int
         Place of the trial with the smallest rms error.
     stopped : str
-        "noise", "no change", "grows" or "trials"; "interrupted" of what an error has as `partial`.
+        "noise", "no change", "not settled", "grows" or "trials"; "interrupted" of what an error has
+        as `partial`.
     first, final : Tracking
         The runs of the first trial and of the best.
     """
@@ -137,6 +143,7 @@ class Learning(Result):
                     "max_error": trial.max_error,
                     "noise": trial.noise,
                     "clipped": trial.clipped,
+                    "unsettled": trial.unsettled,
                 }
                 for trial in self.trials
             ],
@@ -184,7 +191,7 @@ def learn(
     *,
     model: Plant | IdentifiedModel | None = None,
     trials: int = 30,
-    settle: int = 2,
+    settle: int | None = None,
     repeats: int = 2,
     method: Method = "frequency",
     models: Sequence[Plant | IdentifiedModel] = (),
@@ -197,6 +204,7 @@ def learn(
     change_weight: float = 0.01,
     noise: float | None = None,
     rest: float | None = None,
+    offset: float | None = None,
     beyond_reach: bool = False,
     progress: Callable[[IterativeLearning], None] | None = None,
 ) -> Learning:
@@ -226,6 +234,8 @@ def learn(
         Trials at most, the one without learning included.
     settle : int, optional
         Periods before the recorded ones, after the smooth start and the first period of the table.
+        Default 2, or as many as the slowest root of the loop with a feedback takes to a
+        ten-thousandth; at most 1000.
     repeats : int, optional
         Records of each trial: periods, or runs of method ``"lifted"``. Two show what is noise.
     method, models, more_delays, mode_scales, gain, cutoff : optional
@@ -240,6 +250,8 @@ def learn(
     rest : float, optional
         Voltage of a device before and after each trial [V]; default 0 V, or the limit nearest to
         it.
+    offset : float, optional
+        Reading of the stage at rest [m], as of `track`.
     progress : callable, optional
         Called with the learner before the first trial and after each.
 
@@ -278,6 +290,11 @@ def learn(
     # What is behind a device is what its model says.
     behind = known if isinstance(stage, Device) else stage
     plant = plant_of(behind)
+    shift = shift_of(
+        controller, offset, home if isinstance(stage, Device) else simulated_rest(plant)
+    )
+    if shift and not isinstance(stage, Device):
+        plant = shifted(plant, shift)
     learner = IterativeLearning(
         known,
         reference,
@@ -299,12 +316,14 @@ def learn(
     )
     most = _counted("trials", trials, MOST_TRIALS)
     periods = {
-        "settle": _counted("settle", settle, 1000),
-        "repeats": _counted("repeats", repeats, 1000),
+        "settle": _settling(plant_of(known), learner, timing.delay)
+        if settle is None
+        else _counted("settle", settle, MOST_PERIODS),
+        "repeats": _counted("repeats", repeats, MOST_PERIODS),
     }
     runs: Trials
     if isinstance(stage, Device):
-        runs = PlayedTrials(device=stage, rest=home, learner=learner, **periods)
+        runs = PlayedTrials(device=stage, rest=home, shift=shift, learner=learner, **periods)
     else:
         timing = timing_on(plant, timing, controller.limits)
         runs = SimulatedTrials(plant=plant, learner=learner, timing=timing, **periods)
@@ -401,6 +420,18 @@ def _rest_on(
             "timing", "jitter or voltages_before", "none on a device, which has its own", verb="has"
         )
     return rest_of(stage, rest)
+
+
+def _settling(plant: VirtualStage, learner: IterativeLearning, delay: float) -> int:
+    """Return the periods in which the slowest root of a loop falls to `LEFT`."""
+    if learner.controller.feedback is None:
+        return FEWEST_PERIODS
+    report = check_loop(plant, learner.controller, delay=delay)
+    slowest = max(case.slowest_root or 0.0 for _, case in report.cases)
+    if not 0.0 < slowest < 1.0:
+        return MOST_PERIODS if slowest >= 1.0 else FEWEST_PERIODS
+    samples = math.log(LEFT) / math.log(slowest)
+    return min(MOST_PERIODS, max(FEWEST_PERIODS, math.ceil(samples / learner.t.size)))
 
 
 def _counted(name: str, value: object, most: int) -> int:

@@ -128,16 +128,19 @@ class PlayedTrials(Trials):
         The device.
     rest : float
         Voltage before and after each trial [V].
+    shift : float
+        What is subtracted from every reading [m].
     """
 
     device: Device
     rest: float
+    shift: float
 
     def run(self, table: Array, trial: int, repeat: int = 0) -> Tracking:
         """Play a trial; what is random is the device's own."""
         del trial, repeat
         volts = np.clip(self.voltage(table), *self.learner.controller.limits)
-        return played_on(self.device, self.whole, volts, NOTE, rest=self.rest)
+        return played_on(self.device, self.whole, volts, NOTE, rest=self.rest, shift=self.shift)
 
 
 def _start(t: Array, ramp: float) -> Array:

@@ -14,11 +14,17 @@ from ..._support.arguments import not_negative
 from ..._support.units import shown_unit
 from ...errors import ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
-from ..plant import displacement_range, lowest_settled_displacement
+from ..plant import (
+    displacement_range,
+    initial_displacement,
+    lowest_settled_displacement,
+    plant_of_inverse,
+)
 from .stability import check_loop
 
 if TYPE_CHECKING:
     from ...references.reference import Reference, SampledReference
+    from ...stages.inverse import Inverse
     from ...stages.virtual import VirtualStage
     from ..controller.controller import Controller
 
@@ -118,8 +124,14 @@ def check_within_reach(
     limits: tuple[float, float],
     samples: SampledReference,
     drive_unit: str = "V",
+    *,
+    model: Inverse | None = None,
 ) -> None:
-    """Refuse a reference that exceeds the reach of the stage between two voltages [V]."""
+    """Refuse a reference that exceeds the reach of the stage between two voltages [V].
+
+    Where it is beyond only because the stage and the model of the feedforward rest at different
+    readings, that is said with both.
+    """
     low, high = limits
     unit, scale = shown_unit(drive_unit)
     bottom, top = displacement_range(stage, (low, high), 1e-3)
@@ -129,6 +141,7 @@ def check_within_reach(
         (samples.x.min(), bottom - samples.x.min(), bottom),
     ):
         if past > slack:
+            _check_zeros(stage, limits, samples, model, (bottom - slack, top + slack))
             k = int(np.flatnonzero(samples.x == value)[0])
             # What would be within reach from another zero.
             shifted = float(np.ptp(samples.x)) <= top - bottom + slack and stage.sensor.offset
@@ -151,4 +164,27 @@ def check_within_reach(
             f"{1e6 * lowest:.4g} um",
             f"what the stage reaches at {scale * low:g} {unit} on the settled loop, from "
             f"{1e6 * samples.x.max():.4g} um down, or beyond_reach=True",
+        )
+
+
+def _check_zeros(
+    stage: VirtualStage,
+    limits: tuple[float, float],
+    samples: SampledReference,
+    model: Inverse | None,
+    reach: tuple[float, float],
+) -> None:
+    """Refuse a reference that would be within reach [m] if stage and model had one zero."""
+    if model is None:
+        return
+    there, known = (initial_displacement(one, limits) for one in (stage, plant_of_inverse(model)))
+    low, high = samples.x.min() + there - known, samples.x.max() + there - known
+    apart = abs(there - known) > 0.01 * (reach[1] - reach[0])
+    if apart and reach[0] <= low and high <= reach[1]:
+        raise ParameterError(
+            "reference",
+            f"{1e6 * samples.x.min():.4g} to {1e6 * samples.x.max():.4g} um, beyond reach only "
+            f"because the zeros differ: the stage rests at {1e6 * there:.4g} um, the model of the "
+            f"feedforward at {1e6 * known:.4g} um",
+            "offset=pt.zero(stage), with which readings count as in the model",
         )

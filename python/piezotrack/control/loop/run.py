@@ -56,7 +56,7 @@ class Run:
             check_stable(plant, self.controller, delay)
         if not beyond_reach:
             limits, unit = self.controller.limits, self.controller.drive_unit
-            check_within_reach(plant, limits, samples, unit)
+            check_within_reach(plant, limits, samples, unit, model=self.controller.feedforward)
 
     def simulate(
         self,

@@ -24,7 +24,7 @@ from .latency import (
     refuse_slow,
     wait_until,
 )
-from .playing import check_limits
+from .playing import check_limits, shift_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -113,6 +113,7 @@ def track_on(
     reference: Reference,
     *,
     safe: float | None = None,
+    shift: float = 0.0,
     beyond_reach: bool = False,
     unstable: bool = False,
 ) -> DeviceTracking:
@@ -127,6 +128,8 @@ def track_on(
         latency measured.
     safe : float, optional
         Voltage before and after [V]; default 0 V, or the limit nearest to it.
+    shift : float, optional
+        What is subtracted from every reading [m].
 
     Returns
     -------
@@ -157,13 +160,13 @@ def track_on(
     planned = Run(controller, reference)
     volts, note = planned.feedforward
     log = _Log(planned)
-    with terminated(), _safe_after(device, home, controller.dt, log):
+    with terminated(), _safe_after(device, home, log):
         latency = measure_latency(device, controller.dt, rest=home)
         refuse_slow(latency, controller.dt)
         _check_model(planned, latency, beyond_reach=beyond_reach, unstable=unstable)
-        notes = f"{note}; the loop closed on {device.channels[0]}"
+        notes = f"{note}; the loop closed on {device.channels[0]}{shift_words(shift)}"
         try:
-            _run(device, volts, home, log)
+            _run(device, volts, home, shift, log)
         except DeviceError as error:
             error.partial = log.tracking(latency, notes)
             raise
@@ -183,7 +186,7 @@ def _check_model(run: Run, latency: Latency, *, beyond_reach: bool, unstable: bo
         run.check(plant, latency.p99, unstable=unstable, beyond_reach=beyond_reach)
 
 
-def _run(device: Exchanging, feedforward: Array, home: float, log: _Log) -> None:
+def _run(device: Exchanging, feedforward: Array, home: float, shift: float, log: _Log) -> None:
     """Go from tick to tick by the absolute time; a tick that is over is left out."""
     controller = log.run.controller
     session, dt = controller.start(present=home), controller.dt
@@ -199,7 +202,7 @@ def _run(device: Exchanging, feedforward: Array, home: float, log: _Log) -> None
         if late > dt:
             continue
         wait_until(tick)
-        y = _number(device.exchange(held))
+        y = _number(device.exchange(held)) - shift
         held = session.step(x[k], y, feedforward=feedforward[k])
         device.hold(held)
         log.lateness[k] = time.perf_counter() - tick
@@ -215,25 +218,23 @@ def _number(reading: object) -> float:
 
 
 @contextmanager
-def _safe_after(device: Exchanging, home: float, dt: float, log: _Log) -> Iterator[None]:
+def _safe_after(device: Exchanging, home: float, log: _Log) -> Iterator[None]:
     """Lead the output to a voltage [V] at the end, however it comes to it."""
     try:
         yield
     except BaseException as error:
-        _to_safe(device, home, dt, log, error)
+        _to_safe(device, home, log, error)
         raise
-    _to_safe(device, home, dt, log, None)
+    _to_safe(device, home, log, None)
 
 
-def _to_safe(
-    device: Exchanging, home: float, dt: float, log: _Log, error: BaseException | None
-) -> None:
+def _to_safe(device: Exchanging, home: float, log: _Log, error: BaseException | None) -> None:
     done = np.flatnonzero(np.isfinite(log.lateness))
     held = float(log.rows[done[-1], 1]) if done.size else home
     problem: Exception | None = None
     # Slowly, so that nothing is excited; at once where that does not work, or is interrupted.
     try:
-        lead(device, held, home, max(dt, 1e-3))
+        lead(device, held, home)
         return
     except KeyboardInterrupt:
         pass

@@ -25,6 +25,7 @@ from ...stages.inverse import Inverse
 from ..controller.controller import Controller
 from ..loop.run import Run
 from ..loop.tracking import Tracking
+from ..plant import initial_displacement, plant_of_inverse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,7 +35,11 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["check_limits", "check_playable", "play", "played_on"]
+__all__ = ["check_limits", "check_playable", "play", "played_on", "shift_of", "shift_words"]
+
+
+# Farthest reading from 0 [m], as of a session.
+FARTHEST = 0.01
 
 
 def check_limits(device: Device, controller: Controller) -> None:
@@ -79,6 +84,33 @@ def check_playable(device: Device, controller: Controller) -> None:
         )
 
 
+def shift_of(controller: Controller, offset: float | None, rest: float) -> float:
+    """Return what is subtracted from readings [m] where a stage reads `offset` [m] at rest.
+
+    That is `offset` less the displacement at which the model of the feedforward rests at `rest`
+    [V]; 0 where no offset is given.
+    """
+    if offset is None:
+        return 0.0
+    read = finite("offset", offset, "m")
+    if abs(read) > FARTHEST:
+        raise ParameterError(
+            "offset",
+            f"{read:g} m",
+            f"a reading within {1e3 * FARTHEST:g} mm of 0, as of pt.zero; 110 um is 110e-6 m",
+        )
+    inverse = controller.feedforward
+    begun = 0.0
+    if inverse is not None:
+        begun = initial_displacement(plant_of_inverse(inverse), (rest, rest))
+    return read - begun
+
+
+def shift_words(shift: float) -> str:
+    """Write what is subtracted from readings, where something is."""
+    return f", its readings less {1e6 * shift:.4g} um" if shift else ""
+
+
 def played_on(
     device: Device,
     run: Run,
@@ -87,8 +119,9 @@ def played_on(
     *,
     rest: float | None = None,
     ramp: float = RAMP,
+    shift: float = 0.0,
 ) -> Tracking:
-    """Play voltages along a reference on a device [V], and return what it recorded."""
+    """Play voltages along a reference on a device [V], and return its record less `shift` [m]."""
     controller, samples = run.controller, run.samples
     rate = device.rates.nearest(1.0 / controller.dt)
     check_table(device, "voltage", volts)
@@ -98,7 +131,7 @@ def played_on(
         record = play_table(device, table, rate)
     y, notes = filled(record)
     part = slice(first, first + volts.size)
-    measured, applied = y[part], record.volts[part]
+    measured, applied = y[part] - shift, record.volts[part]
     low, high = controller.limits
     nothing = np.zeros(volts.size)
     return Tracking(
@@ -117,7 +150,7 @@ def played_on(
         fine_t=samples.t,
         fine_displacement=measured,
         fine_voltage=applied,
-        note="; ".join([f"{note}, played on {device.channels[0]}", *notes]),
+        note="; ".join([f"{note}, played on {device.channels[0]}{shift_words(shift)}", *notes]),
     )
 
 
@@ -129,6 +162,7 @@ def play(
     rate: float | None = None,
     rest: float | None = None,
     ramp: float = RAMP,
+    offset: float | None = None,
 ) -> Tracking:
     """Follow a reference with a feedforward that a device plays as a table.
 
@@ -151,6 +185,9 @@ def play(
         Voltage before and after [V]; default 0 V, or the limit nearest to it.
     ramp : float, optional
         Length of the way from rest and back [s].
+    offset : float, optional
+        Reading of the device at rest [m], as of `zero`: readings then count from where the model of
+        the feedforward is at rest. By default they are as they come.
 
     Returns
     -------
@@ -196,4 +233,12 @@ def play(
     volts, note = run.feedforward
     volts = np.clip(volts, *controller.limits)
     ways = None if rest is None else finite("rest", rest, "V")
-    return played_on(device, run, volts, note, rest=ways, ramp=not_negative("ramp", ramp, "s"))
+    return played_on(
+        device,
+        run,
+        volts,
+        note,
+        rest=ways,
+        ramp=not_negative("ramp", ramp, "s"),
+        shift=shift_of(controller, offset, rest_of(device, rest)),
+    )

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 from ... import _core
 from ...errors import ParameterError
 from ...hardware.device import Device
+from ...hardware.measuring import rest_of
 from ...references.parse import reference_of
 from ..controller.controller import Controller
 from ..loop.preconditions import check_drive_unit
 from ..loop.run import Run
 from ..on_device.closed_loop import track_on
-from ..plant import plant_of, timing_on
+from ..on_device.playing import shift_of
+from ..plant import plant_of, shifted, simulated_rest, timing_on
 
 if TYPE_CHECKING:
     from ...identification.fitted.identified_model import IdentifiedModel
@@ -34,6 +36,7 @@ def track(
     beyond_reach: bool = False,
     unstable: bool = False,
     safe: float | None = None,
+    offset: float | None = None,
 ) -> Tracking:
     """Track a reference in closed loop, on a simulated stage or on a device.
 
@@ -65,6 +68,10 @@ def track(
     safe : float, optional
         Of a device: voltage before and after [V]; default 0 V, or the limit nearest to it. `timing`
         and `substeps` are those of a simulation.
+    offset : float, optional
+        Reading of the stage at rest [m], as of `zero`: readings then count from where the model of
+        the feedforward is at rest, without one from 0, so that a log and a stage with different
+        zeros meet. By default they are as they come.
 
     Returns
     -------
@@ -100,11 +107,19 @@ def track(
                 "timing or substeps", "given", "neither on a device, which has its own"
             )
         return track_on(
-            stage, controller, reference, safe=safe, beyond_reach=beyond_reach, unstable=unstable
+            stage,
+            controller,
+            reference,
+            safe=safe,
+            shift=shift_of(controller, offset, rest_of(stage, safe)),
+            beyond_reach=beyond_reach,
+            unstable=unstable,
         )
     if safe is not None:
         raise ParameterError("safe", f"{safe!r}", "none, as the stage is simulated")
     plant = plant_of(stage)
+    if shift := shift_of(controller, offset, simulated_rest(plant)):
+        plant = shifted(plant, shift)
     check_drive_unit(stage, controller)
     timing = timing_on(plant, timing, controller.limits)
     substeps = _core.as_count("substeps", substeps)

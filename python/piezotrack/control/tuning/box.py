@@ -24,6 +24,8 @@ __all__ = ["PARTS", "Box", "Parts", "box_of", "parts_named", "resonance"]
 PARTS = ("pid", "low-pass", "notch", "repetitive")
 # Beyond this damping ratio a mode does not ring.
 RINGING = 0.4
+# A low-pass with a cutoff above so many sampling rates is left out, as in the core.
+FASTEST = 2.0
 # A sampled filter has no room nearer to half the sampling rate.
 NYQUIST = 0.475
 
@@ -50,7 +52,7 @@ class Box(NamedTuple):
         """Make the parts of a controller from the settings that were found."""
         law = law_of(self.law, settings, self.dt, self.sign, self.nominal)
         filters: list[LowPass | Notch] = []
-        if "cutoff" in settings:
+        if settings.get("cutoff", math.inf) * self.dt <= FASTEST:
             filters.append(LowPass(settings["cutoff"]))
         if "notch_frequency" in settings:
             names = ("notch_frequency", "notch_width", "notch_depth")
@@ -78,7 +80,7 @@ class Box(NamedTuple):
             ends = (math.log(low), math.log(high)) if logarithmic else (low, high)
             value = math.log(settings[name]) if logarithmic else settings[name]
             place = (value - ends[0]) / (ends[1] - ends[0])
-            if place > 0.999:
+            if place > 0.999 and name != "cutoff":
                 notes.append(
                     f"{name} at the upper end of its range, {self._shown(name, high, drive_unit)}"
                 )
@@ -163,7 +165,7 @@ def box_of(
     if "low-pass" in parts:
         # An axis whose reading is late moves ahead: so it can make up for its lag.
         slow = min(0.02 / dt, 0.06 / lag) if lag > 0.0 else 0.02 / dt
-        ranges.append(("cutoff", slow, 2.0 / dt, True))
+        ranges.append(("cutoff", slow, 2.0 * FASTEST / dt, True))
     if "notch" in parts:
         ranges += _notch(plants, dt)
     if "repetitive" in parts:

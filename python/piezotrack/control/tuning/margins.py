@@ -63,7 +63,9 @@ class Margins:
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
-    """Deviations of the stage from its model: each end is added to the set of plants.
+    """Deviations of the stage from its model.
+
+    Each end of delay, mode and gain is added to the set of plants.
 
     Parameters
     ----------
@@ -75,6 +77,10 @@ class Spread:
     gain : float, optional
         Share by which the static gain may be lower or higher, beyond the least and the largest gain
         of the hysteresis.
+    offset : float, optional
+        Share of the stroke of a reference, from the start of a run on, by which the feedforward is
+        off when the stage begins to follow it; until its end it drifts by as much again. Only the
+        cost has it, no margin depends on it.
 
     Raises
     ------
@@ -91,6 +97,7 @@ class Spread:
     delay: tuple[float, float] = (0.0, 0.0)
     mode: float = 0.0
     gain: float = 0.0
+    offset: float = 0.05
 
     def __post_init__(self) -> None:
         if not isinstance(self.delay, Sequence) or len(self.delay) != 2:
@@ -98,7 +105,7 @@ class Spread:
         low, high = (not_negative("delay", one, "s") for one in self.delay)
         if low > high:
             raise ParameterError("delay", f"({low:g}, {high:g}) s", "the lower one first")
-        for name in ("mode", "gain"):
+        for name in ("mode", "gain", "offset"):
             if not 0.0 <= finite(name, getattr(self, name), "") < 0.95:
                 raise ParameterError(name, getattr(self, name), "a share, 0 to below 0.95")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...errors import ParameterError
@@ -61,7 +60,7 @@ def _number(value: float) -> str:
 
 def refusal(problem: TuningProblem, nearest: Solution) -> ParameterError:
     """Say which constraint forbids any controller, and how far the nearest one is off."""
-    goal, outcome, names = problem.goal, nearest.outcome, nearest.names
+    goal, outcome, names = problem.goal, nearest.outcome, nearest.searched_names
     robustness, figures = outcome["robustness"], outcome["figures"]
     if outcome["excess"] <= 1.0:
         worst = max(nearest.kept, key=lambda one: one.share)
@@ -72,9 +71,9 @@ def refusal(problem: TuningProblem, nearest: Solution) -> ParameterError:
         )
     if robustness[0][0] > 0.0:
         return ParameterError(
-            f"models: no gains in the search make all {len(names)} plants stable, the nearest "
-            f"leave {names[robustness[0][1]]} unstable: expected a smaller spread, or plants "
-            "nearer to each other",
+            f"models: no gains in the search make all {len(nearest.names)} plants stable, the "
+            f"nearest leave {names[robustness[0][1]]} unstable: expected a smaller spread, or "
+            "plants nearer to each other",
             argument="models",
         )
     if not figures:
@@ -87,8 +86,7 @@ def refusal(problem: TuningProblem, nearest: Solution) -> ParameterError:
             f"{goal.slew:.4g} V/s",
             f"{fastest:.4g} V/s, which the slowest controller needs along these references",
         )
-    error = math.sqrt(sum(one[0] ** 2 for one in figures) / len(figures))
-    if error > goal.largest_error:
+    if (error := nearest.rms_error) > goal.largest_error:
         return ParameterError(
             "largest_error",
             f"{1e6 * goal.largest_error:.4g} um",

@@ -49,6 +49,8 @@ PERIODS = 4
 SLACK = 0.05
 # Share by which gains of a place are better than the fixed ones, or the fixed ones are taken.
 LEAST_GAIN = 0.03
+# A schedule in which a place is worse than with the fixed ones by more than rounding has only them.
+SPOILT = 1.001
 Waveform = Callable[[float, float], Reference]
 PathForm = Callable[[float, float], XYReference]
 
@@ -282,9 +284,13 @@ def _chosen(
         # A search for one reference alone may miss what that for all has found; and in the schedule
         # its gains begin with those of the places around it.
         better = [new < (1.0 - LEAST_GAIN) * old for new, old in zip(after, before, strict=True)]
-        if all(gains or one is fixed for gains, one in zip(better, chosen, strict=True)):
+        settled = all(gains or one is fixed for gains, one in zip(better, chosen, strict=True))
+        # The gains of a place act on the way to another, too.
+        spoilt = any(new > SPOILT * old for new, old in zip(after, before, strict=True))
+        if settled and (not spoilt or all(one is fixed for one in chosen)):
             return chosen, scheduled, np.column_stack([before, after])
-        chosen = [one if gains else fixed for gains, one in zip(better, chosen, strict=True)]
+        kept = [gains and not settled for gains in better]
+        chosen = [one if gains else fixed for gains, one in zip(kept, chosen, strict=True)]
 
 
 def _scheduled(grid: ScheduledPid, loop: Controller, tuned: Sequence[Any], axis: int) -> Controller:

@@ -11,11 +11,12 @@ from ...errors import ParameterError
 from ...references.xy_reference import XYReference
 from ..controller.controller import Controller
 from ..loop.tracking import can_be_learnt
-from .box import Box, box_of, resonance
+from .box import box_of, resonance
 from .goal import Goal
 from .margins import NamedPlant, plants_of
-from .motions import tasks_of
-from .starts import place_of, simc
+from .model_set.searched import AxisSearch, SearchedSet
+from .starts import simc
+from .structures import gains_of
 from .tuned import MarginReport
 
 if TYPE_CHECKING:
@@ -28,39 +29,11 @@ __all__ = ["Solution", "search_at"]
 # again.
 SLACK = 0.003
 # Searches with more and more in reserve.
-ROUNDS = 4
+ROUNDS = 8
+# By how much the cost may grow where an integral time below the interval is replaced.
+SIMILAR = 1.02
 # Budget of the search for gains from margins alone that a search along references begins with.
 ALONE = {"particles": 24, "iterations": 12}
-
-
-class AxisSearch(NamedTuple):
-    """Controller of an axis, with the ranges of its settings and the plants of the set."""
-
-    name: str
-    box: Box
-    base: Controller
-    plants: list[NamedPlant]
-
-    def controller(self, settings: dict[str, float]) -> Controller:
-        """Return the controller with these settings."""
-        parts = self.box.parts(settings)
-        return replace(
-            self.base,
-            feedback=parts.feedback,
-            filters=(*self.base.filters, *parts.filters),
-            repetitive=parts.repetitive,
-        )
-
-    @property
-    def _core(self) -> _core.SoughtController:
-        return _core.SoughtController(
-            controller=self.base._core,
-            period=self.box.period,
-            sign=self.box.sign,
-            law=(self.box.law, *self.box.nominal),
-            sought=self.box.ranges,
-            plants=[one.plant for one in self.plants],
-        )
 
 
 class Solution(NamedTuple):
@@ -72,12 +45,18 @@ class Solution(NamedTuple):
         Settings, figures and counts of the core.
     axes : list of AxisSearch
         Controllers that were searched.
+    searched : list of list of int
+        The plants of each axis in the search, as `outcome` numbers them.
+    stages : int
+        Stages that it simulated.
     kept : list of MarginReport
-        The margins of the settings, exact.
+        The margins of the settings over all plants, exact.
     """
 
     outcome: dict[str, Any]
     axes: list[AxisSearch]
+    searched: list[list[int]]
+    stages: int
     kept: list[MarginReport]
 
     @property
@@ -93,8 +72,24 @@ class Solution(NamedTuple):
 
     @property
     def names(self) -> list[str]:
-        """The plants, as the core numbers them."""
+        """The plants of the set."""
         return [one.name for axis in self.axes for one in axis.plants]
+
+    @property
+    def searched_names(self) -> list[str]:
+        """The plants in the search, as the core numbers them."""
+        pairs = zip(self.axes, self.searched, strict=True)
+        return [axis.plants[i].name for axis, numbers in pairs for i in numbers]
+
+    @property
+    def rms_error(self) -> float:
+        """Rms error over the motions [m], of the worst stage in the search."""
+        squares = [one[0] ** 2 for one in self.outcome["figures"]]
+        motions = len(squares) // self.stages
+        if not motions:
+            return 0.0
+        parts = [squares[i : i + motions] for i in range(0, len(squares), motions)]
+        return math.sqrt(max(sum(one) for one in parts) / motions)
 
     @property
     def controllers(self) -> tuple[Controller, ...]:
@@ -114,58 +109,100 @@ class Solution(NamedTuple):
 
 
 def search_at(problem: TuningProblem, dt: float) -> Solution:
-    """Search at one sampling interval; where the exact margins are beyond, with some in reserve."""
+    """Search at one sampling interval, and check the result exactly over the whole set.
+
+    Where the search did not see what is beyond or follows worse, it is repeated with that; where
+    it did see a plant whose exact margins are beyond, with some in reserve.
+    """
     axes = [_axis_search(problem, axis, dt) for axis in problem.axes]
-    repeats = any(axis.box.period is not None for axis in axes)
-    tasks = tasks_of(problem, [axis.base for axis in axes], repeats)
-    cores = [axis._core for axis in axes]
-    starts = _starts(problem, axes, cores) if tasks else []
-    reserve = 1.0
+    models = SearchedSet(problem, axes, dt)
+    starts = _starts(problem, models) if models.follows else []
+    reserve, rounds = 1.0, 0
     solution: Solution | None = None
-    for _ in range(ROUNDS):
-        outcome = _core.tune(
-            problem,
-            margins=_with_reserve(problem.margins, reserve),
-            axes=cores,
-            tasks=tasks,
-            starts=starts,
-        )
-        if outcome["excess"] > 1.0 and solution is not None:
+    while rounds < ROUNDS:
+        outcome = models.search(problem, _with_reserve(problem.margins, reserve), starts)
+        if outcome["excess"] > 1.0 and reserve > 1.0 and solution is not None:
             # Nothing keeps what is in reserve.
             return solution
-        solution = Solution(outcome, axes, [])
+        solution, beyond = _checked(problem, models, outcome)
         if outcome["excess"] > 1.0:
             return solution
-        solution = solution._replace(kept=_margin_reports(problem, solution))
         if solution.feasible:
-            return solution
-        reserve *= 1.0 + 1.2 * (solution.excess - 1.0)
+            worst, grown = models.take_stage(outcome["settings"], outcome["cost"])
+            outcome["cost"] = worst
+            if not grown:
+                return _entered(problem, models, solution)
+        elif not models.take_plants(beyond):
+            reserve *= 1.0 + 1.2 * (solution.excess - 1.0)
+            rounds += 1
     assert solution is not None
     return solution
 
 
-def _starts(
-    problem: TuningProblem, axes: list[AxisSearch], cores: list[_core.SoughtController]
-) -> list[list[float]]:
-    """Gains of the tuning rule, and those from margins alone."""
+def _entered(problem: TuningProblem, models: SearchedSet, solution: Solution) -> Solution:
+    """Take integral times from the sampling interval on, or proportional parts that vanish.
+
+    Of a PID whose integral time is below the interval, that becomes the interval, or the
+    proportional part becomes the least: what costs less, with the margins kept, and not more than
+    `SIMILAR`.
+    """
+    for k, axis in enumerate(solution.axes):
+        settings = dict(solution.outcome["settings"][k])
+        pid = axis.box.parts(settings).feedback._pid
+        if axis.box.law != "pid" or pid is None:
+            continue
+        gains = gains_of(pid, axis.box.dt)
+        if gains.kp is None or gains.ti is not None or gains.ki is None:
+            continue
+        least = next(low for name, low, *_ in axis.box.ranges if name == "kp")
+        before = models.cost(solution.outcome["settings"])[1]
+        found = [(SIMILAR, solution)]
+        for kp in (settings["ki"], least):
+            outcome = dict(solution.outcome)
+            outcome["settings"] = list(solution.outcome["settings"])
+            outcome["settings"][k] = list({**settings, "kp": kp}.items())
+            excess, cost = models.cost(outcome["settings"])
+            changed, _ = _checked(problem, models, outcome)
+            if excess <= 1.0 and changed.feasible:
+                outcome["cost"] *= cost / before
+                found.append((cost / before, changed))
+        solution = min(found, key=lambda one: one[0])[1]
+    return solution
+
+
+def _starts(problem: TuningProblem, models: SearchedSet) -> list[list[float]]:
+    """Gains of the tuning rule, and those from margins alone.
+
+    The plants that these do not keep join the search.
+    """
+    axes = models.axes
     ranges = [one for axis in axes for one in axis.box.ranges]
     if not any(name == "ki" for name, *_ in ranges):
         return []
     rules = [simc([one.plant for one in axis.plants], axis.base.dt) for axis in axes]
-    starts = [
-        [at for axis, one in zip(axes, gains, strict=True) for at in place_of(one, axis.box.ranges)]
-        for gains in zip(*rules, strict=True)
-    ]
+    starts = [models.place(gains) for gains in zip(*rules, strict=True)]
     alone = replace(problem, goal=Goal(), search=replace(problem.search, **ALONE))
-    outcome = _core.tune(
-        alone,
-        margins=_with_reserve(problem.margins, 1.0),
-        axes=cores,
-        tasks=[],
-        starts=starts,
-    )
-    pairs = zip(axes, outcome["settings"], strict=True)
-    return [*starts, [at for axis, one in pairs for at in place_of(dict(one), axis.box.ranges)]]
+    margins = _with_reserve(problem.margins, 1.0)
+    for _ in range(ROUNDS):
+        outcome = models.search(alone, margins, starts, along=False)
+        _, beyond = _checked(problem, models, outcome)
+        if outcome["excess"] > 1.0 or not models.take_plants(beyond):
+            break
+    return [*starts, models.place(outcome["settings"])]
+
+
+def _checked(
+    problem: TuningProblem, models: SearchedSet, outcome: dict[str, Any]
+) -> tuple[Solution, list[tuple[int, int]]]:
+    """Check the margins of what was found exactly: with the plants beyond, by axis and number."""
+    searched = [list(one) for one in models.plants]
+    solution = Solution(outcome, models.axes, searched, max(len(models.stages), 1), [])
+    if outcome["excess"] > 1.0:
+        return solution, []
+    worst = _worst(problem, solution)
+    kept = [report for report, *_ in worst]
+    beyond = [(axis, i) for report, axis, i in worst if report.share > 1.0 + SLACK]
+    return solution._replace(kept=kept), beyond
 
 
 def _axis_search(problem: TuningProblem, axis: Axis, dt: float) -> AxisSearch:
@@ -225,8 +262,8 @@ def _with_reserve(margins: Margins, reserve: float) -> tuple[float, float, float
     return gain, phase, sensitivity, learning
 
 
-def _margin_reports(problem: TuningProblem, solution: Solution) -> list[MarginReport]:
-    """Check the margins of a solution, exactly, over all plants."""
+def _worst(problem: TuningProblem, solution: Solution) -> list[tuple[MarginReport, int, int]]:
+    """Check the margins of a solution, exactly, over all plants: the worst, by axis and number."""
     margins = problem.margins
     bounds = {
         "gain margin": margins.gain,
@@ -234,9 +271,10 @@ def _margin_reports(problem: TuningProblem, solution: Solution) -> list[MarginRe
         "learning": margins.learning,
         "sensitivity": margins.sensitivity,
     }
-    worst: dict[str, MarginReport] = {}
-    for axis, controller in zip(solution.axes, solution.controllers, strict=True):
-        for name, plant in axis.plants:
+    worst: dict[str, tuple[MarginReport, int, int]] = {}
+    pairs = zip(solution.axes, solution.controllers, strict=True)
+    for number, (axis, controller) in enumerate(pairs):
+        for i, (name, plant) in enumerate(axis.plants):
             check = _core.check_loop(controller._core, plant)
             values = {
                 "gain margin": check["gain_margin"] or math.inf,
@@ -246,8 +284,8 @@ def _margin_reports(problem: TuningProblem, solution: Solution) -> list[MarginRe
             }
             for key, value in values.items():
                 report = MarginReport(key, value, bounds[key], name)
-                if key not in worst or report.share > worst[key].share:
-                    worst[key] = report
+                if key not in worst or report.share > worst[key][0].share:
+                    worst[key] = (report, number, i)
     if all(one.repetitive is None for one in solution.controllers):
         del worst["learning"]
     return list(worst.values())

@@ -234,7 +234,6 @@ def _active_constraints(problem: TuningProblem, best: Solution) -> list[str]:
     goal, figures = problem.goal, best.outcome["figures"]
     if math.isfinite(goal.slew) and max(one[3] for one in figures) > ACTIVE * goal.slew:
         active.append("slew")
-    rms = math.sqrt(sum(one[0] ** 2 for one in figures) / max(len(figures), 1))
-    if rms > ACTIVE * goal.largest_error:
+    if best.rms_error > ACTIVE * goal.largest_error:
         active.append("largest_error")
     return active + best.edges()

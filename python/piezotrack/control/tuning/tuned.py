@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from ... import _core
 from ..._support.display.result import Result
 from ..._support.files.writing import make_folder, result_set, save_figures, write_document
-from ..._support.units import decibels
+from ..._support.units import decibels, shown_unit
 from ..loop.contouring import Contour
+from .structures import gains_of
 
 if TYPE_CHECKING:
     import os
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from ...references.xy_reference import XYReference
     from ..controller.controller import Controller
     from ..loop.tracking import Tracking
+    from ..parts.part import FeedbackLaw
     from .margins import Margins
 
 __all__ = ["MARGIN_UNITS", "MarginReport", "Tuned", "motion_of", "picture_name"]
@@ -254,6 +256,22 @@ def picture_name(i: int) -> str:
     return "tuned" if i == 0 else f"tuned_{i + 1}"
 
 
+def _gains(law: FeedbackLaw, controller: Controller) -> dict[str, Any] | None:
+    """Return the gains of a PID law as they are entered, the unit in the name."""
+    if law.info.name != "pid":
+        return None
+    gains, (unit, scale) = gains_of(law._pid, controller.dt), shown_unit(controller.drive_unit)
+    shown = {
+        f"kp_{unit}_per_um": (gains.kp, 1e-6 * scale),
+        "ti_ms": (gains.ti, 1e3),
+        f"ki_{unit}_per_um_s": (gains.ki, 1e-6 * scale),
+        "td_ms": (gains.td, 1e3),
+        f"kd_{unit}_s_per_um": (gains.kd, 1e-6 * scale),
+    }
+    values = {name: factor * one for name, (one, factor) in shown.items() if one is not None}
+    return {"law": gains.name, **values}
+
+
 def _settings(controller: Controller) -> dict[str, Any]:
     """Return the settings of a controller for the JSON file."""
     law, learner = controller.feedback, controller.repetitive
@@ -261,6 +279,7 @@ def _settings(controller: Controller) -> dict[str, Any]:
         "dt": {"value": controller.dt, "unit": "s"},
         "limits": {"value": list(controller.limits), "unit": controller.drive_unit},
         "feedback": None if law is None else asdict(law),
+        "gains": None if law is None else _gains(law, controller),
         "filters": [{"kind": type(one).__name__, **asdict(one)} for one in controller.filters],
         "repetitive": None if learner is None else asdict(learner),
     }

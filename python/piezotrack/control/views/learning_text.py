@@ -13,6 +13,8 @@ __all__ = ["heading", "learning_text", "outcome", "trial_line"]
 WHY = {
     "noise": "what repeats in the error is not distinguishable from the noise",
     "no change": "the error falls no further",
+    "not settled": "the error falls no further, and the motion has not settled when it is "
+    "recorded: expected more periods before the record (settle=), or a faster loop",
     "grows": "the error grows",
     "trials": "all trials were made",
     "interrupted": "it was interrupted, or the device failed",
@@ -39,7 +41,16 @@ def outcome(learning: Learning) -> list[str]:
     """Write why it ended, and whether the table is at a limit."""
     clipped = learning.trials[learning.best].clipped
     limited = f"the table is at a limit in {100.0 * clipped:.1f} % of its samples"
-    return [*([limited] if clipped > 0.0 else []), f"ended: {WHY[learning.stopped]}"]
+    moved = learning.trials[-1].unsettled
+    differs = (
+        f"the periods of a record differ by {1e9 * abs(moved):.4g} nm in the mean, beyond the "
+        "noise: the loop has not settled, the stage creeps, or the sensor drifts"
+    )
+    return [
+        *([limited] if clipped > 0.0 else []),
+        *([differs] if moved else []),
+        f"ended: {WHY[learning.stopped]}",
+    ]
 
 
 def learning_text(learning: Learning) -> str:

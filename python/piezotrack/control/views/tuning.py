@@ -55,8 +55,10 @@ def tuned_text(tuned: Tuned) -> str:
         )
     word = "contour error " if len(gains) > 1 else ""
     for run in tuned.runs:
-        lines.append(f"{motion_of(run)!r}: measured {word}{run.metrics}")
-        lines.append(f"  true {word}{ErrorStatistics.__str__(run.score(true=True))}")
+        measured, true = (ErrorStatistics.__str__(run.score(true=one)) for one in (False, True))
+        seen = "" if measured == true else "measured "
+        lines.append(f"{motion_of(run)!r}: {seen}{word}{run.metrics}")
+        lines += [f"  true {word}{true}"] if seen else []
     lines += _bandwidths(tuned)
     lines.append(f"over {len(tuned.plants)} plants:")
     lines += [f"  {one}" for one in tuned.kept]

@@ -21,11 +21,11 @@ use crate::signal::{Stop, index};
 /// Quantity that is made small.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aim {
-    /// The error, m rms over all tasks.
+    /// The error, m rms over the motions.
     Rms,
-    /// The largest error in any task, m.
+    /// The largest error in any motion, m.
     Largest,
-    /// The change of the command from sample to sample, V rms over all tasks.
+    /// The change of the command from sample to sample, V rms over the motions.
     Effort,
     /// Nothing is simulated: the integral gain is made large, so that the integral of the error
     /// after a step disturbance is small. Panagopoulos, Astrom and Hagglund 2002,
@@ -49,8 +49,11 @@ pub struct SoughtController {
 pub struct Tuning<'a> {
     /// One controller, or those of both axes of an XY stage.
     pub axes: Vec<SoughtController>,
-    /// Motions that the controllers are judged by.
+    /// Motions that the controllers are judged by: all of the first stage, then of the second, and so
+    /// on.
     pub tasks: Vec<Judge<'a>>,
+    /// Stages that follow the motions; the worst of them counts.
+    pub stages: usize,
     /// Requirements on every loop.
     pub required: Requirements,
     /// Quantity that is made small.
@@ -357,6 +360,10 @@ impl Tuning<'_> {
         if self.tasks.is_empty() && self.aim != Aim::Disturbance {
             return Err(Error::parameter("tasks", "none", "a reference or more"));
         }
+        if self.stages == 0 || !self.tasks.len().is_multiple_of(self.stages) {
+            let expected = format!("a part of the {} tasks", self.tasks.len());
+            return Err(Error::parameter("stages", self.stages, expected));
+        }
         if self.tasks.iter().any(|task| task.axes() != self.axes.len()) {
             return Err(Error::parameter("axes", self.axes.len(), "as many as the tasks have"));
         }
@@ -446,8 +453,21 @@ impl Tuning<'_> {
         all
     }
 
-    /// Figure over all tasks, and how far from what is required.
+    /// Figure of the worst stage, and how far from what is required.
     fn figure(&self, all: &[RunMetrics], excess: f64) -> (f64, f64) {
+        let motions = (all.len() / self.stages.max(1)).max(1);
+        all.chunks(motions).fold((0.0, excess), |(cost, excess), own| {
+            let (figure, beyond) = self.figure_of(own, excess);
+            // Also where it is not a number.
+            (
+                if figure <= cost { cost } else { figure },
+                if beyond <= excess { excess } else { beyond },
+            )
+        })
+    }
+
+    /// Figure of a stage over its motions, and how far from what is required.
+    fn figure_of(&self, all: &[RunMetrics], excess: f64) -> (f64, f64) {
         let count = index(all.len()).max(1.0);
         let mean = |of: fn(&RunMetrics) -> f64| {
             libm::sqrt(all.iter().map(|one| of(one) * of(one)).sum::<f64>() / count)

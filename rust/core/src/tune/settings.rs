@@ -7,6 +7,9 @@ use piezotrack_control::{
 use crate::error::{Error, Result};
 use crate::parts::Law;
 
+/// Highest cutoff of a low-pass, in sampling rates; above it the filter is left out.
+pub const FASTEST: f64 = 2.0;
+
 /// A setting that is sought.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Setting {
@@ -16,7 +19,7 @@ pub enum Setting {
     Integral,
     /// Derivative gain a sample, Kp Td/Ts, V/m.
     Derivative,
-    /// Cutoff of the low-pass on the measurement, Hz.
+    /// Cutoff of the low-pass on the measurement, Hz; above [`FASTEST`] there is none.
     Cutoff,
     /// Middle of the notch, Hz.
     NotchFrequency,
@@ -174,7 +177,7 @@ impl Template {
         }
         // Those of the base stay.
         let mut slots = out.filters.iter_mut().filter(|slot| slot.is_none());
-        if let Some(cutoff) = value(Setting::Cutoff) {
+        if let Some(cutoff) = value(Setting::Cutoff).filter(|one| one * self.dt <= FASTEST) {
             *slots.next()? = Some(Filter::low_pass(cutoff, self.dt).ok()?);
         }
         if let Some(frequency) = value(Setting::NotchFrequency) {

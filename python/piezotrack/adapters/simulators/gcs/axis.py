@@ -36,6 +36,8 @@ LONGEST_STEP = 100
 ON_TARGET = 0.005
 # Decimals of the travel [um], so that its ends are in it as they are written.
 DIGITS = 3
+# Time and points of the way to rest [cycles].
+WAY, WAY_POINTS = round(0.5 * CLOCK), 250
 # Longest time after a change that is simulated [cycles]: what still creeps after a minute creeps no
 # further. With the servo on, which settles in a fraction of a second, less.
 LONGEST_REST, LONGEST_SERVO = round(60.0 * CLOCK), round(2.0 * CLOCK)
@@ -165,6 +167,14 @@ class VirtualAxis:
         self.generator, self._since = None, 0
         self.target = self.position
         self.control = self.voltage
+
+    def lead_to_rest(self) -> None:
+        """Lead the output to 0 V, or the limit nearest to it, with the servo off."""
+        self.stop()
+        self.set_servo(False)
+        low, high = self.limits
+        way = np.linspace(self.voltage, min(max(0.0, low), high), WAY_POINTS)
+        self.start(way, rate=WAY // WAY_POINTS, repetitions=1, interpolated=False, offset=0.0)
 
     @property
     def _at_rest(self) -> bool:

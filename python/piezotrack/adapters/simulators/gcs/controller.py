@@ -143,6 +143,20 @@ class VirtualController:
                 self._record()
         return None
 
+    @property
+    def generating(self) -> bool:
+        """Whether the wave generator runs."""
+        with self._lock:
+            self._axis.catch_up()
+            return self._axis.generator is not None
+
+    def left(self, abandoned: str) -> None:
+        """End a wave whose client has gone, as of `GcsServer`."""
+        with self._lock:
+            if self.generating and abandoned != "runs":
+                self._mode = 0
+                self._axis.stop() if abandoned == "stops" else self._axis.lead_to_rest()
+
     # Queries of the controller.
 
     def _commands(self, words: Sequence[str]) -> list[str]:

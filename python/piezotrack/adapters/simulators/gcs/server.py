@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 from .... import _core
-from ...._support.arguments import expect
+from ...._support.arguments import expect, one_of
 from ....errors import ParameterError
 from ....hardware.limits import ordered
 from ....stages.virtual import VirtualStage
@@ -24,6 +24,7 @@ __all__ = ["GcsServer"]
 SINGLE = (MOVING + READY + GENERATOR + STOP).encode(ENCODING)
 # Speed beyond which no computer keeps up.
 FASTEST = 1e4
+ABANDONED = ("runs", "stops", "rests")
 # Longest command [bytes].
 LONGEST = 65536
 # Characters of answers from which on they go out before the next command is looked at.
@@ -49,6 +50,10 @@ class GcsServer:
         TCP port, 0 for any free one.
     speed : float, optional
         How much faster than real time the stage goes, as far as the computer keeps up.
+    abandoned : {"runs", "stops", "rests"}, optional
+        What becomes of a wave when the client that has started it has gone: it goes on, as with a
+        real controller; it stops where it is; or the output is led to 0 V, or the limit nearest to
+        it, in half a second of the stage.
 
     Raises
     ------
@@ -75,6 +80,7 @@ class GcsServer:
         host: str = "127.0.0.1",
         port: int = 0,
         speed: float = 1.0,
+        abandoned: Literal["runs", "stops", "rests"] = "runs",
     ) -> None:
         expect(
             "stage",
@@ -89,6 +95,10 @@ class GcsServer:
             raise ParameterError(
                 "speed", f"{speed:g}", f"above 0, and up to {FASTEST:g} times real time"
             )
+        one_of("abandoned", abandoned, ABANDONED)
+        self._abandoned: str = abandoned
+        # The connection that has started the last wave.
+        self._started: socket.socket | None = None
         self._host, self._limits = host, within
         self._controller = VirtualController(stage, within, speed=speed)
         try:
@@ -127,6 +137,14 @@ class GcsServer:
         self.close()
 
     def _converse(self, link: socket.socket) -> None:
+        """Answer a client until it goes, and end its wave where that is asked for."""
+        try:
+            self._answer(link)
+        finally:
+            if self._started is link:
+                self._controller.left(self._abandoned)
+
+    def _answer(self, link: socket.socket) -> None:
         """Answer a client until it goes; no more answers are kept than go out together."""
         lines, error = Lines(b"\r\n", LONGEST, SINGLE), 0
         while more := link.recv(65536):
@@ -141,6 +159,8 @@ class GcsServer:
                 else:
                     try:
                         answer = self._controller.ask(command) or []
+                        if command.strip().upper().startswith("WGO "):
+                            self._started = link
                     except Refusal as refusal:
                         answer, error = [], refusal.code
                 answers += one_answer(answer) if answer else ""

@@ -7,23 +7,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ... import _core
-from ...errors import ParameterError
-from ...references.xy_reference import XYReference
-from ..loop.closed_loop import stepped
-from ..loop.preconditions import check_drive_unit, check_within_reach
-from ..loop.tracking import feedforward_of, first_counted
-from ..plant import plant_of
+from .... import _core
+from ....errors import ParameterError
+from ....references.reference import Reference
+from ....references.xy_reference import XYReference
+from ...loop.closed_loop import stepped
+from ...loop.preconditions import check_drive_unit, check_within_reach
+from ...loop.tracking import feedforward_of, first_counted
+from ...plant import plant_of
+from .followers import followers_of, middle_gain, start_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from ...references.reference import Reference, SampledReference
-    from ...stages.virtual import VirtualStage
-    from ..controller.controller import Controller
-    from .problem import Axis, TuningProblem
+    from ....references.reference import SampledReference
+    from ....stages.virtual import VirtualStage
+    from ...controller.controller import Controller
+    from ..problem import Axis, TuningProblem
 
     Array = NDArray[np.float64]
 
@@ -34,22 +36,37 @@ NOTHING = np.empty(0)
 
 def tasks_of(
     problem: TuningProblem, bases: Sequence[Controller], repeats: bool
-) -> list[_core.Task | _core.PathTask]:
-    """Make a task of each reference and draw of the noise; `bases` have the feedforward."""
-    tasks: list[_core.Task | _core.PathTask] = []
+) -> list[list[_core.Task | _core.PathTask]]:
+    """Make a task of each reference and draw of the noise, for every stage of the set.
+
+    Each stage follows with the feedforward of the first, which `bases` have. That is off by the
+    offset of the spread, and drifts by as much.
+    """
     for axis, base in zip(problem.axes, bases, strict=True):
         check_drive_unit(axis.stages[0], base)
-    for reference in problem.references:
-        for draw in range(problem.search.draws):
-            if isinstance(reference, XYReference):
-                tasks.append(_path_task(problem, bases, reference, draw, repeats))
-            else:
-                (axis,), (base,) = problem.axes, bases
-                samples = _samples(problem, axis, reference, base.dt)
-                tasks.append(
-                    _task(problem, axis, base, (reference, samples, NOTHING), draw, repeats)
-                )
-    return tasks
+    draws = range(problem.search.draws)
+    if problem.stage is not None:
+        both: list[_core.Task | _core.PathTask] = [
+            _path_task(problem, bases, path, draw, repeats)
+            for path in problem.references
+            if isinstance(path, XYReference)
+            for draw in draws
+        ]
+        return [both]
+    (axis,), (base,) = problem.axes, bases
+    motions = [
+        (one, _samples(problem, axis, one, base.dt), NOTHING)
+        for one in problem.references
+        if isinstance(one, Reference)
+    ]
+    return [
+        [
+            _task(problem, axis, base, stage, motion, draw, repeats)
+            for motion in motions
+            for draw in draws
+        ]
+        for stage in followers_of(axis)
+    ]
 
 
 def _path_task(
@@ -63,7 +80,7 @@ def _path_task(
     beside = (xy * _moved(y, -stage.lag), yx * _moved(x, stage.lag))
     motions = zip(path.axes, (x, y), beside, strict=True)
     both = [
-        _task(problem, axis, base, motion, draw, repeats)
+        _task(problem, axis, base, plant_of(axis.stages[0]), motion, draw, repeats)
         for axis, base, motion in zip(problem.axes, bases, motions, strict=True)
     ]
     circle = None
@@ -83,28 +100,40 @@ def _task(
     problem: TuningProblem,
     axis: Axis,
     base: Controller,
+    plant: VirtualStage,
     motion: tuple[Reference, SampledReference, Array],
     draw: int,
     repeats: bool,
 ) -> _core.Task:
     reference, samples, beside = motion
-    plant = plant_of(axis.stages[0])
     sensor = replace(plant.sensor, seed=plant.sensor.seed + draw)
     seeded: VirtualStage = stepped(replace(plant, sensor=sensor), base)
     first = first_counted(reference, samples, learns=repeats)
     if problem.stage is not None:
         # The smooth start has no path to compare with.
         first = max(first, int(np.searchsorted(samples.t, reference.ramp - 1e-9)))
+    off = problem.spread.offset * _voltages(axis, samples, problem.limits)
     return _core.Task(
         stage=seeded._core,
         timing=axis.timing,
         dt=base.dt,
         reference=samples.x,
-        feedforward=feedforward_of(base, reference, samples).voltage,
+        feedforward=feedforward_of(base, reference, samples).voltage + off,
         beside=beside,
         first=first,
         measured=problem.goal.error == "measured",
     )
+
+
+def _voltages(axis: Axis, samples: SampledReference, limits: tuple[float, float]) -> Array:
+    """Voltage of the whole travel of a reference from the start of the run, growing to its double.
+
+    An error of the feedforward by a share of it is an offset, and a drift, by that share.
+    """
+    first = plant_of(axis.stages[0])
+    x = np.append(samples.x, start_of(axis, first))
+    volts = float(np.ptp(x)) / middle_gain(first, limits)
+    return volts * np.linspace(1.0, 2.0, len(samples))
 
 
 def _samples(
@@ -114,9 +143,9 @@ def _samples(
     samples = reference.sample(dt)
     if problem.goal.largest_saturation >= 0.5:
         return samples
-    for i, stage in enumerate(axis.stages, 1):
+    for i, stage in enumerate(followers_of(axis), 1):
         try:
-            check_within_reach(plant_of(stage), problem.limits, samples, problem.drive_unit)
+            check_within_reach(stage, problem.limits, samples, problem.drive_unit)
         except ParameterError as error:
             error.args = (
                 str(error).replace("beyond_reach=True", "largest_saturation=0.5 or more"),

@@ -1,0 +1,1 @@
+"""The set of models of a tuning: which are simulated, and which plants stand for the others."""
