@@ -165,7 +165,7 @@ def box_of(
     if "low-pass" in parts:
         # An axis whose reading is late moves ahead: so it can make up for its lag.
         slow = min(0.02 / dt, 0.06 / lag) if lag > 0.0 else 0.02 / dt
-        ranges.append(("cutoff", slow, 2.0 * FASTEST / dt, True))
+        ranges.append(("cutoff", slow, 1.25 * FASTEST / dt, True))
     if "notch" in parts:
         ranges += _notch(plants, dt)
     if "repetitive" in parts:

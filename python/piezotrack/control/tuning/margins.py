@@ -78,9 +78,9 @@ class Spread:
         Share by which the static gain may be lower or higher, beyond the least and the largest gain
         of the hysteresis.
     offset : float, optional
-        Share of the stroke of a reference, from the start of a run on, by which the feedforward is
-        off when the stage begins to follow it; until its end it drifts by as much again. Only the
-        cost has it, no margin depends on it.
+        Share of the stroke by which the feedforward is off at the start of each reference; until
+        its end it drifts to as much on the other side. The stroke is that of the motion, with the
+        way to its first point. Only the error that is made small has it, no margin does.
 
     Raises
     ------
@@ -97,7 +97,7 @@ class Spread:
     delay: tuple[float, float] = (0.0, 0.0)
     mode: float = 0.0
     gain: float = 0.0
-    offset: float = 0.05
+    offset: float = 0.02
 
     def __post_init__(self) -> None:
         if not isinstance(self.delay, Sequence) or len(self.delay) != 2:

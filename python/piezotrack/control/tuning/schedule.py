@@ -49,7 +49,7 @@ PERIODS = 4
 SLACK = 0.05
 # Share by which gains of a place are better than the fixed ones, or the fixed ones are taken.
 LEAST_GAIN = 0.03
-# A schedule in which a place is worse than with the fixed ones by more than rounding has only them.
+# Where a place of the schedule is worse than with the fixed ones by more, its neighbour gets those.
 SPOILT = 1.001
 Waveform = Callable[[float, float], Reference]
 PathForm = Callable[[float, float], XYReference]
@@ -284,13 +284,24 @@ def _chosen(
         # A search for one reference alone may miss what that for all has found; and in the schedule
         # its gains begin with those of the places around it.
         better = [new < (1.0 - LEAST_GAIN) * old for new, old in zip(after, before, strict=True)]
-        settled = all(gains or one is fixed for gains, one in zip(better, chosen, strict=True))
-        # The gains of a place act on the way to another, too.
-        spoilt = any(new > SPOILT * old for new, old in zip(after, before, strict=True))
-        if settled and (not spoilt or all(one is fixed for one in chosen)):
-            return chosen, scheduled, np.column_stack([before, after])
-        kept = [gains and not settled for gains in better]
-        chosen = [one if gains else fixed for gains, one in zip(kept, chosen, strict=True)]
+        own = [i for i, one in enumerate(chosen) if one is not fixed]
+        if all(better[i] for i in own):
+            ratios = np.array(after) / np.array(before)
+            if not own or ratios.max() <= SPOILT:
+                return chosen, scheduled, np.column_stack([before, after])
+            # The gains of a place act on the way to others: those nearest to the worst go.
+            better[_nearest(int(ratios.argmax()), own, len(grid.rates))] = False
+        chosen = [one if gains else fixed for gains, one in zip(better, chosen, strict=True)]
+
+
+def _nearest(place: int, others: Sequence[int], columns: int) -> int:
+    """Return which of some places of the grid is nearest to a place."""
+
+    def distance(other: int) -> int:
+        (row, column), (its, at) = divmod(place, columns), divmod(other, columns)
+        return abs(row - its) + abs(column - at)
+
+    return min(others, key=distance)
 
 
 def _scheduled(grid: ScheduledPid, loop: Controller, tuned: Sequence[Any], axis: int) -> Controller:

@@ -76,16 +76,21 @@ def tune(
 ) -> Tuned:
     """Find the gains of a controller, its filters and its repetitive part.
 
-    Searches from several sides evaluate controllers in closed loop with the stage, with its noise,
+    Searches from several sides evaluate controllers in closed loop with the stages, with noise,
     quantisation, delay, jitter, saturation and creep, and make the error along the references
-    small. There are four of them, and two more where none ends within 2 % of the best; one begins
-    with Skogestad's rule (2003, doi 10.1016/S0959-1524(02)00062-8) and with the gains from margins
-    alone. Each is by differential evolution (Tanabe and Fukunaga 2014, doi
-    10.1109/CEC.2014.6900380), refined by CMA-ES (Hansen 2016, arXiv 1604.00772). Every
-    controller keeps the margins for every plant of a set: each stage given at its lowest, middle
-    and highest gain, with every end of the spread. What it keeps is checked exactly in the end.
-    Without a reference the gains follow from the margins alone: the largest integral gain that
-    keeps them (Panagopoulos, Astrom and Hagglund 2002, doi 10.1049/ip-cta:20020013).
+    small: that of the worst stage. All stages follow with the feedforward of the first, which is
+    off by an offset that drifts, ``Spread(offset=...)``. There are four searches, and two more
+    where none ends within 2 % of the best; one begins with Skogestad's rule (2003, doi
+    10.1016/S0959-1524(02)00062-8) and with the gains from margins alone. Each is by differential
+    evolution (Tanabe and Fukunaga 2014, doi 10.1109/CEC.2014.6900380), refined by CMA-ES (Hansen
+    2016, arXiv 1604.00772).
+
+    Every controller keeps the margins for every plant of a set: each stage given at its lowest,
+    middle and highest gain, with every end of the spread. Of many stages and plants a search sees
+    those that are farthest from each other; what it finds is checked exactly on all, and where
+    another is beyond or follows worse by 2 %, it is repeated with that. Without a reference the
+    gains follow from the margins alone: the largest integral gain that keeps them (Panagopoulos,
+    Astrom and Hagglund 2002, doi 10.1049/ip-cta:20020013).
 
     For an XY stage the error is the contour error, and each axis gets a controller of its own:
     ``x, y = pt.tune(xy_stage, path, ...).controllers``, for `contour`. The search takes what
@@ -95,8 +100,9 @@ def tune(
     Parameters
     ----------
     stage : Stage, VirtualStage, IdentifiedModel, or a sequence of them; or XYStage
-        The first is simulated; the margins hold for all of them. A stage model and an identified
-        one have no noise and no amplifier: ``pt.VirtualStage.of`` gives them both.
+        All are simulated, from the zero of the first and with its feedforward, and the margins hold
+        for all. The first has no noise and no amplifier where it is a model: ``pt.VirtualStage.of``
+        gives it both. Other models have those of the first.
     reference : Reference, str or sequence of them, optional
         Motions along which the error counts; of an XY stage paths, as ``pt.circle(...)``. A text or
         a file is taken as by the command line: ``"triangle:1Hz,5..42um"``.

@@ -107,10 +107,11 @@ class Tuned(Result):
     unit : str
         Its unit: ``"m"``, of the effort ``"V"``.
     value : float
-        Its value; without a reference the integral of the error after a step disturbance of
-        1 V at the input of the stage [m s/V].
+        Its value, of the worst stage with the offset of the spread; without a reference the
+        integral of the error after a step disturbance of 1 V at the input of the stage [m s/V].
     runs : tuple of Tracking or of Contour
-        Full simulations of the tuned loop, one for each reference.
+        Full simulations of the tuned loop on the first stage without an offset, one for each
+        reference.
     kept : tuple of MarginReport
         The margins over the set of plants.
     margins : Margins

@@ -42,7 +42,7 @@ def posterior_models(
 
     Each axis gives two models, one in either direction. What the record does not determine moves by
     half of its value at most. ``pt.tune([fit, *posterior_models(fit, log)], ...)`` keeps its
-    margins for all of them.
+    margins for all of them, and makes the error of the worst small.
 
     Parameters
     ----------

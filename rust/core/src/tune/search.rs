@@ -161,10 +161,9 @@ impl Side {
     /// Part of the range in which a setting begins.
     fn part(self, setting: Setting) -> (f64, f64) {
         match (self, setting) {
-            (Self::Slow, Setting::Cutoff) | (Self::Fast | Self::Inside, Setting::Learning) => {
-                (0.0, 0.3)
-            }
-            (Self::Fast, Setting::Cutoff) => (0.3, 1.0),
+            (Self::Slow, Setting::Cutoff) => (0.0, 0.26),
+            (Self::Fast, Setting::Cutoff) => (0.26, 1.0),
+            (Self::Fast | Self::Inside, Setting::Learning) => (0.0, 0.3),
             (Self::Fast | Self::Inside, Setting::Integral) => (0.5, 1.0),
             // It does not evolve from there; its refinement has it.
             (Self::Inside, Setting::Observer) => (0.0, 0.0),

@@ -40,7 +40,7 @@ def tasks_of(
     """Make a task of each reference and draw of the noise, for every stage of the set.
 
     Each stage follows with the feedforward of the first, which `bases` have. That is off by the
-    offset of the spread, and drifts by as much.
+    offset of the spread, and drifts to as much on the other side.
     """
     for axis, base in zip(problem.axes, bases, strict=True):
         check_drive_unit(axis.stages[0], base)
@@ -126,14 +126,15 @@ def _task(
 
 
 def _voltages(axis: Axis, samples: SampledReference, limits: tuple[float, float]) -> Array:
-    """Voltage of the whole travel of a reference from the start of the run, growing to its double.
+    """Voltage of the travel of a reference from the start of the run, falling to its negative.
 
-    An error of the feedforward by a share of it is an offset, and a drift, by that share.
+    An error of the feedforward by a share of it is an offset that drifts to as much on the other
+    side: its mean is 0, so that no gains can make another error up with it.
     """
     first = plant_of(axis.stages[0])
     x = np.append(samples.x, start_of(axis, first))
     volts = float(np.ptp(x)) / middle_gain(first, limits)
-    return volts * np.linspace(1.0, 2.0, len(samples))
+    return volts * np.linspace(1.0, -1.0, len(samples))
 
 
 def _samples(
