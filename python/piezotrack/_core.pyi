@@ -39,6 +39,7 @@ __all__ = [
     "as_number",
     "as_truth",
     "autoregression",
+    "bounded_least_squares",
     "check_loop",
     "check_margins",
     "check_part",
@@ -57,6 +58,7 @@ __all__ = [
     "period_metrics",
     "published",
     "read_step",
+    "resampled_noises",
     "residual",
     "resonances",
     "sensor_noise",
@@ -519,6 +521,12 @@ def path_errors(
 ) -> NDArray[np.float64]: ...
 def spread(errors: ArrayLike) -> _Spread: ...
 def autoregression(noise: ArrayLike) -> tuple[list[float], float]: ...
+def resampled_noises(
+    noise: ArrayLike, scale: float, draws: int, seed: int
+) -> list[list[float]]: ...
+def bounded_least_squares(
+    rows: list[list[float]], right: list[float], bounds: list[tuple[float, float]]
+) -> list[float]: ...
 def linearised_covariance(
     records: Sequence[
         tuple[

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from iminuit import Minuit
 from matplotlib.figure import Figure
+from scipy.optimize import brentq, nnls
 
 import piezotrack as pt
 
@@ -271,9 +272,109 @@ def test_what_has_no_intervals_is_refused_in_a_sentence(tmp_path: Path) -> None:
     loaded = pt.load(fit.save(tmp_path / "model.json"))
     with pytest.raises(pt.ParameterError, match="record"):
         loaded.confidence()
-    plays = pt.identify(measured(), "prandtl-ishlinskii", method=pt.LeastSquares(count=3))
-    with pytest.raises(pt.ParameterError, match="covariance"):
-        plays.confidence()
     short = fitted(measured(u=np.ascontiguousarray(NESTED[::40])), damping=1e3)
     with pytest.raises(pt.DataError, match="short"):
         short.confidence(method="bootstrap")
+
+
+THRESHOLDS = np.array([4.0, 10.0, 20.0, 30.0])
+WEIGHTS = np.array([0.2e-6, 0.0, 0.05e-6, 0.01e-6])
+
+
+def of_plays(noise: float, weights: np.ndarray = WEIGHTS) -> pt.Dataset:
+    """Record of a stage of plays, by default one of weight 0 and one near it."""
+    stage = pt.stages.PrandtlIshlinskiiStage(
+        linear=1e-6, thresholds=tuple(THRESHOLDS.tolist()), weights=tuple(weights.tolist())
+    )
+    clean = stage.simulate(NESTED, DT, initial=stage.equilibrium(NESTED[0])).x
+    added = noise * np.random.default_rng(1).standard_normal(TIME.size)
+    return pt.Dataset(u=NESTED, y=clean + added, dt=DT)
+
+
+def with_thresholds(data: pt.Dataset) -> Identification:
+    method = pt.LeastSquares(
+        thresholds=THRESHOLDS.tolist(), dynamics=None, dead_zones=0, creep=False
+    )
+    return pt.identify(data, "prandtl-ishlinskii", history="virgin", method=method)
+
+
+def play(threshold: float) -> np.ndarray:
+    """Brokate and Sprekels 1996, Hysteresis and Phase Transitions, 2.3: from rest at 0 V on."""
+    w, values = 0.0, []
+    for u in NESTED:
+        w = max(u - threshold, min(u + threshold, w))
+        values.append(w)
+    return np.array(values)
+
+
+def test_profiles_of_weights_end_where_those_of_nonnegative_least_squares_do() -> None:
+    """Lawson and Hanson's algorithm (SciPy) on plays of the test's own."""
+    data = of_plays(50e-9)
+    fit = with_thresholds(data)
+    sure = fit.confidence()
+    columns = np.array([NESTED, *(play(r) for r in THRESHOLDS), np.ones_like(NESTED)]).T
+    columns = np.column_stack([columns, -columns[:, -1]])
+    size = np.array([1e-6, *np.full(4, 1e-7), 1e-6, 1e-6])
+
+    def squares(held: int | None = None, value: float = 0.0) -> float:
+        left = data.y if held is None else data.y - value * columns[:, held]
+        rest = np.delete(columns * size, held, axis=1) if held is not None else columns * size
+        return float(nnls(rest * 1e6, left * 1e6)[1]) ** 2
+
+    least, freedom = squares(), data.y.size - 6
+    names = ["linear", *(f"weights[{k}]" for k in range(4))]
+    for k, name in enumerate(names):
+        one = sure.parameters[name]
+        limit = one.factor * 1.959964**2
+
+        def rise(value: float, k: int = k, limit: float = limit) -> float:
+            return freedom * (squares(k, value) / least - 1.0) - limit
+
+        width = 20.0 * fit.covariance.deviation("weights[0]")  # type: ignore[union-attr]
+        upper = brentq(rise, one.value, one.value + width)
+        assert one.interval.upper == pytest.approx(upper, abs=2e-3 * width)
+        if rise(max(one.value - width, 0.0)) < 0.0:
+            assert one.shape == "open below"
+        else:
+            lower = brentq(rise, max(one.value - width, 0.0), one.value)
+            assert one.interval.lower == pytest.approx(lower, abs=2e-3 * width)
+    assert sure.parameters["weights[1]"].shape == "open below"
+    assert sure.parameters["weights[0]"].shape == "bounded"
+
+
+def test_profiles_refits_and_covariance_of_plays_agree_away_from_0() -> None:
+    fit = with_thresholds(of_plays(20e-9, np.array([0.2e-6, 0.1e-6, 0.05e-6, 0.08e-6])))
+    profiles, refits = fit.confidence(), fit.confidence(method="bootstrap")
+    assert fit.covariance is not None
+    for name, width in widths(profiles).items():
+        of_covariance = 2.0 * 1.959964 * fit.covariance.deviation(name)
+        assert width == pytest.approx(of_covariance, rel=0.02)
+        assert widths(refits)[name] == pytest.approx(width, rel=0.2)
+    at_zero = with_thresholds(of_plays(20e-9)).confidence(method="bootstrap")
+    assert float(at_zero.parameters["weights[1]"].values.min()) == 0.0
+
+
+def test_the_dynamics_behind_plays_have_profiles_too() -> None:
+    """A mode, in which the motion is not linear; a falling stage is the mirror image."""
+    stage = pt.stages.PrandtlIshlinskiiStage(
+        linear=1e-6, thresholds=(10.0,), weights=(0.2e-6,), frequency=40.0, damping_ratio=0.1
+    )
+    steps = np.repeat([0.0, 30.0, 10.0, 60.0, 20.0, 75.0, 0.0], 250)
+    y = stage.simulate(steps, DT, initial=stage.equilibrium(0.0)).x
+    y += 20e-9 * np.random.default_rng(3).standard_normal(steps.size)
+    method = pt.LeastSquares(thresholds=[10.0], dynamics="second", dead_zones=0, creep=False)
+    found = []
+    for sign in (1.0, -1.0):
+        fit = pt.identify(
+            pt.Dataset(u=steps, y=sign * y, dt=DT),
+            "prandtl-ishlinskii",
+            method=method,
+            history="virgin",
+        )
+        found.append(fit.confidence())
+    for name, value in (("frequency", 40.0), ("damping_ratio", 0.1)):
+        low, high = found[0].interval(name)
+        assert low < value < high < 1.1 * value
+        assert found[1].interval(name) == pytest.approx((low, high), rel=1e-4)
+    rising, falling = (one.interval("weights[0]") for one in found)
+    assert falling == pytest.approx((-rising.upper, -rising.lower), rel=1e-3)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ... import _core
-from ...errors import PiezotrackError
+from ...errors import ParameterError, PiezotrackError
 from ..fitted.identified_model import IdentifiedModel
 from ..fitted.start import same_beginning, start_after, start_at_jump
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DELAY",
+    "LinearisedRecord",
     "Sensitivity",
     "Value",
     "changes",
@@ -38,6 +39,8 @@ __all__ = [
 
 # Share of a value by which it is moved to see its effect.
 STEP = 1e-4
+# The same of an entry that is 0, in the mean of its list: a weight, in which the motion is linear.
+FROM_ZERO = 0.1
 # The same of a delay in sampling intervals, and of a voltage before the record in its range.
 LATER, BEFORE = 1e-2, 1e-4
 DELAY = "delay"
@@ -166,7 +169,15 @@ def sizes_of(model: IdentifiedModel, values: list[Value], dt: float) -> Array:
     ndarray, shape (p,)
         SI, above 0.
     """
-    return np.array([abs(value.of(model)) or dt for value in values], dtype=np.float64)
+    return np.array([_size(model, value) or dt for value in values], dtype=np.float64)
+
+
+def _size(model: IdentifiedModel, value: Value) -> float:
+    """Size of a value, of an entry that is 0 the mean of those of its list, or 1 of its unit."""
+    size = abs(value.of(model))
+    if size == 0.0 and value.entry is not None:
+        size = float(np.mean(np.abs(getattr(model.model, value.parameter)))) or 1.0
+    return size
 
 
 def gradient(model: IdentifiedModel, quantity: Callable[[IdentifiedModel], float]) -> Array:
@@ -266,7 +277,10 @@ def _normalised(model: IdentifiedModel, changed: Mapping[str, Any]) -> dict[str,
     # The envelope is 0 at 0 V and rises by as much as the drive.
     ends = np.array(model.drive_range)
     rise = float(np.diff(np.tanh(stage.slope * ends + stage.shift))[0]) * stage.scale
-    scale = rise / float(np.diff(np.tanh(now["slope"] * ends + now["shift"]))[0])
+    steep = float(np.diff(np.tanh(now["slope"] * ends + now["shift"]))[0])
+    if steep == 0.0:
+        raise ParameterError("slope", now["slope"], "one with which the envelope rises")
+    scale = rise / steep
     middle = stage.level + stage.scale * np.tanh(stage.shift)
     return {"scale": scale, "level": float(middle - scale * np.tanh(now["shift"]))}
 
@@ -305,10 +319,10 @@ def sensitivity(model: IdentifiedModel, data: Dataset, values: list[Value]) -> S
     Sensitivity
         Of the readings that count.
     """
-    record = _Linearised(model, data)
+    record = LinearisedRecord(model, data)
     count, nuisance = record.residual.size, record.nuisance()
     return Sensitivity(
-        columns=changes(model, values, record.begun, data.dt).reshape(-1, count),
+        columns=record.columns(model, values),
         nuisance=np.array(list(nuisance.values())).reshape(-1, count),
         alone=tuple(nuisance),
         residual=record.residual,
@@ -342,7 +356,8 @@ def changes(
     """
     columns = []
     for value in values:
-        size = LATER * dt if value.parameter == DELAY else STEP * abs(value.of(model))
+        share = FROM_ZERO if value.of(model) == 0.0 else STEP
+        size = LATER * dt if value.parameter == DELAY else share * _size(model, value)
         for ways in ((1.0, -1.0), (1.0, 0.0), (0.0, -1.0)):
             up, down = (moved(model, [value], np.array([size * way])) for way in ways)
             if up is not None and down is not None:
@@ -353,8 +368,21 @@ def changes(
     return np.array(columns)
 
 
-class _Linearised:
-    """A record, the state in which it begins, and its residual."""
+class LinearisedRecord:
+    """A record, the state in which it begins, and its residual about an identified model.
+
+    Parameters
+    ----------
+    model : IdentifiedModel
+        The model.
+    data : Dataset
+        The record, in the window that was fitted.
+
+    Attributes
+    ----------
+    residual : ndarray, shape (n,)
+        Measured less simulated displacement of the readings that count [m].
+    """
 
     def __init__(self, model: IdentifiedModel, data: Dataset) -> None:
         self.model, self.data = model, data.without_far_readings()
@@ -364,24 +392,46 @@ class _Linearised:
         self.record: Any = mine[-1] if mine else model
         # A model found by least squares creeps before its record; one that is searched is at rest.
         self.creeps = not model.model.info.searched
-        reading = self.data.counted(self.data.y - self._reading(model, self.start.state))
-        self.residual = reading - self._level(reading)
+        self.residual = self._rest(self._counted(model, self.start.state), {})
 
-    def _level(self, reading: Array) -> Array:
-        """Offset and drift that suit a residual best."""
-        columns = list(self._sensor().values())
+    def residual_of(self, model: IdentifiedModel, alone: Mapping[str, float]) -> Array:
+        """Return the residual of a model beside the one that was fitted.
+
+        Parameters
+        ----------
+        model : IdentifiedModel
+            The model; its offset and the size of its drift suit the record best.
+        alone : dict of str to float
+            Changes of what belongs to the record alone, of ``"drift_time"`` [s],
+            ``"voltage_before"`` [V] and ``"delay"`` [s].
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            As `residual` [m].
+        """
+        start = self.start.voltage
+        voltage = None if start is None else start + alone.get("voltage_before", 0.0)
+        later = alone.get(DELAY, 0.0)
+        moved = self._later(model, later) if later else model
+        return self._rest(self._counted(moved, self._begun(moved, voltage)), alone)
+
+    def _rest(self, reading: Array, alone: Mapping[str, float]) -> Array:
+        """Measured displacement less a reading, with the offset and drift that suit it best."""
+        left = np.asarray(self.data.counted(self.data.y)) - reading
+        columns = list(self._sensor(alone.get("drift_time", 0.0)).values())
         if not columns:
-            return np.zeros(reading.size)
+            return left
         basis = np.array(columns).T
-        return np.asarray(basis @ np.linalg.lstsq(basis, reading, rcond=1e-12)[0])
+        return np.asarray(left - basis @ np.linalg.lstsq(basis, left, rcond=1e-12)[0])
 
-    def _sensor(self) -> dict[str, Array]:
-        """Columns of the offset and of the drift's size."""
+    def _sensor(self, longer: float = 0.0) -> dict[str, Array]:
+        """Columns of the offset and of the size of the drift, of a changed time constant."""
         t = self.data.counted(self.data.t)
         drift = self.record.drift
         columns = {"offset": np.ones(t.size)} if self.record.offset_fitted or drift else {}
         if drift:
-            columns["drift"] = np.exp(-(t - drift.begin) / drift.time)
+            columns["drift"] = np.exp(-(t - drift.begin) / (drift.time + longer))
         return columns
 
     def nuisance(self) -> dict[str, Array]:
@@ -407,16 +457,22 @@ class _Linearised:
     def _delayed(self) -> Array:
         """Change with the delay of one of several records [m/s]."""
         step = LATER * self.data.dt
-        at = [
-            tuple(
-                replace(one, delay=one.delay + s) if one is self.record else one
-                for one in self.model.records
-            )
-            for s in (step, -step)
-        ]
-        base = _without_search(self.model)
-        up, down = (self._counted(replace(base, records=all_), self.start.state) for all_ in at)
+        ends = (self._later(self.model, s) for s in (step, -step))
+        up, down = (self._counted(model, self.start.state) for model in ends)
         return np.asarray((up - down) / (2.0 * step))
+
+    def _later(self, model: IdentifiedModel, by: float) -> IdentifiedModel:
+        """Model whose reading of this record is later [s]."""
+        records = tuple(
+            replace(one, delay=one.delay + by) if one is self.record else one
+            for one in model.records
+        )
+        return replace(_without_search(model), records=records)
+
+    def columns(self, model: IdentifiedModel, values: list[Value]) -> Array:
+        """Change of the readings of a model with each value, shape (p, n) [m/...]."""
+        columns = changes(model, values, self.begun, self.data.dt)
+        return columns.reshape(-1, self.residual.size)
 
     def begun(self, model: IdentifiedModel) -> Array:
         """Return the reading of a model that begins as the record does [m]."""

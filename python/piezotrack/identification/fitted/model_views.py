@@ -56,8 +56,8 @@ class ModelViews(Result):
         Raises
         ------
         ParameterError
-            `level` or `method` is none of these, the model was read from a file and has no record,
-            or its parameters were not searched.
+            `level` or `method` is none of these, or the model was read from a file and has no
+            record.
         DataError
             The record is too short.
         NumericalError

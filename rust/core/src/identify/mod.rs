@@ -25,7 +25,7 @@ pub use experiments::step_response::{
     Conventional, StepReadings, StepResponse, read_step, separate,
 };
 pub use identification::{Identification, OwnResult, identify, identify_together};
-pub use inference::{Autoregression, Covariance, Linearised, covariance};
+pub use inference::{Autoregression, Covariance, Linearised, covariance, resampled_noises};
 pub use intervals::chain::ProfilePoint;
 pub use intervals::profile::{Profile, Profiles};
 pub use least_squares::{

@@ -7,6 +7,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::error::{Error, Result};
+
 /// Bounds of an unknown that must not fall below 0.
 pub const NOT_NEGATIVE: (f64, f64) = (0.0, f64::INFINITY);
 
@@ -64,6 +66,23 @@ pub fn bounded(mut a: DMatrix<f64>, b: &DVector<f64>, bounds: &[(f64, f64)]) -> 
         }
     }
     DVector::from_fn(n, |j, _| if scale[j] > 0.0 { set.x[j] / scale[j] } else { set.x[j] })
+}
+
+/// [`bounded`] of rows and their right sides.
+///
+/// # Errors
+/// [`Error::Shape`] where there are not as many right sides as rows, or bounds as entries of a row.
+pub fn bounded_rows(rows: &[Vec<f64>], right: &[f64], bounds: &[(f64, f64)]) -> Result<Vec<f64>> {
+    if rows.len() != right.len() || rows.iter().any(|row| row.len() != bounds.len()) {
+        return Err(Error::Shape {
+            name: "rows".into(),
+            found: format!("{} with {} right sides", rows.len(), right.len()),
+            expected: format!("one of {} numbers for each right side", bounds.len()),
+        });
+    }
+    let matrix = DMatrix::from_fn(rows.len(), bounds.len(), |i, j| rows[i][j]);
+    let x = bounded(matrix, &DVector::from_column_slice(right), bounds);
+    Ok(x.iter().copied().collect())
 }
 
 /// The unknowns in use, and the values of all.

@@ -11,7 +11,7 @@ mod rows;
 mod threads;
 mod transfer_function;
 
-pub use bounded_least_squares::{FREE, NOT_NEGATIVE, bounded};
+pub use bounded_least_squares::{FREE, NOT_NEGATIVE, bounded, bounded_rows};
 pub use lanes::Lanes;
 pub use memory::{available, room, zeros};
 pub use rows::Rows;

@@ -1,6 +1,7 @@
 //! Covariance of the values of a fit, and the values that ties give.
 
-use piezotrack_core::identify::{Autoregression, Linearised, Tie, covariance};
+use piezotrack_core::identify::{Autoregression, Linearised, Tie, covariance, resampled_noises};
+use piezotrack_core::math::bounded_rows;
 use piezotrack_core::models::Model;
 use pyo3::prelude::*;
 
@@ -10,7 +11,9 @@ use crate::errors::raise;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(autoregression, module)?)?;
+    module.add_function(wrap_pyfunction!(bounded_least_squares, module)?)?;
     module.add_function(wrap_pyfunction!(linearised_covariance, module)?)?;
+    module.add_function(wrap_pyfunction!(noises_like, module)?)?;
     module.add_function(wrap_pyfunction!(tied_values, module)?)
 }
 
@@ -73,6 +76,29 @@ fn linearised_covariance(
 fn autoregression(noise: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, f64)> {
     let found = Autoregression::of(&samples("noise", noise)?);
     Ok((found.coefficients, found.variance))
+}
+
+/// The numbers within bounds whose products with rows are nearest to the right sides.
+#[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "extracted from lists")]
+fn bounded_least_squares(
+    rows: Vec<Vec<f64>>,
+    right: Vec<f64>,
+    bounds: Vec<(f64, f64)>,
+) -> PyResult<Vec<f64>> {
+    bounded_rows(&rows, &right, &bounds).map_err(|error| raise(&error))
+}
+
+/// Noises like one, their variance times a factor.
+#[pyfunction]
+#[pyo3(name = "resampled_noises")]
+fn noises_like(
+    noise: &Bound<'_, PyAny>,
+    scale: f64,
+    draws: u32,
+    seed: u64,
+) -> PyResult<Vec<Vec<f64>>> {
+    Ok(resampled_noises(&samples("noise", noise)?, scale, (draws, seed)))
 }
 
 /// Values of all parameters of a model, with those that are tied from the others.

@@ -28,7 +28,7 @@ DRAWS, SEED, FEWEST = 200, 1, 80
 
 
 def bootstrap_confidence(searched: SearchedFit, level: float) -> Confidence:
-    """Return the intervals of a search from refits of resampled noise.
+    """Return intervals from refits of resampled noise.
 
     Parameters
     ----------

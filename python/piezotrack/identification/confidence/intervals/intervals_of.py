@@ -20,7 +20,7 @@ __all__ = ["intervals_of"]
 
 
 def intervals_of(model: IdentifiedModel, level: float, method: str) -> Confidence:
-    """Return the intervals of what a search fitted.
+    """Return the intervals of what was fitted.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ KEPT = 1e3
 
 
 def profile_confidence(searched: SearchedFit, level: float) -> Confidence:
-    """Return the intervals of a search from profiles of its cost.
+    """Return intervals from profiles of its cost.
 
     Parameters
     ----------
@@ -78,11 +78,6 @@ def profile_confidence(searched: SearchedFit, level: float) -> Confidence:
             ends = [min(ends[0], fitted), max(ends[1], fitted)]
         estimate, bounds = searched.estimate(name), searched.core.coordinates[place][2:]
         on_bound = least[place] in bounds or estimate.at_bound
-        if name not in covered:
-            notes.append(
-                f"{name} has no covariance{', as it lies on a bound' if on_bound else ''}: its "
-                "threshold has the largest factor of the others"
-            )
         kept = curve <= KEPT
         parameters[name] = ParameterInterval(
             value=least[place],
@@ -96,6 +91,14 @@ def profile_confidence(searched: SearchedFit, level: float) -> Confidence:
             values=values[kept],
             rises=np.maximum(curve[kept], 0.0),
         )
+    bare = [name for name in parameters if name not in covered]
+    for on_bound in (True, False):
+        names = [name for name in bare if parameters[name].on_bound is on_bound]
+        if names:
+            reason = "on a bound and without covariance" if on_bound else "without covariance"
+            notes.append(
+                f"{', '.join(names)}: {reason}; the threshold has the largest factor of the others"
+            )
     return Confidence(
         method="profile",
         level=level,

@@ -1,4 +1,4 @@
-"""A search around its result: the problem that it solved, and its values there."""
+"""A fit around its result: the problem that was solved, and its values there."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ from .... import _core
 from ....data.checks.fast_drive import is_fast
 from ....errors import DataError, ParameterError, PiezotrackError
 from ...fitted.certainty.confidence import LowerMinimum
+from ...fitted.estimates import Estimate
 from ...fitted.start import start_after, start_at_jump
 from ...problem.parameter import Parameter
 from ...problem.problem import Problem
 from ...problem.records import Record
 from ..estimate import covariance_of
-from ..sensitivity import DELAY, Value, moved
+from ..sensitivity import DELAY, Value, fitted_values, moved
+from .local_weights import LocalWeights
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ....data.dataset import Dataset
     from ...fitted.certainty.covariance import Covariance
-    from ...fitted.estimates import Estimate
     from ...fitted.fitted_record import FittedRecord
     from ...fitted.identification import Identification
     from ...fitted.identified_model import IdentifiedModel
 
     Array = NDArray[np.float64]
+    Local = _core.LocalFit | LocalWeights
 
 __all__ = ["OF_SHORTEST_LAG", "SearchedFit"]
 
@@ -42,14 +44,14 @@ OF_SHORTEST_LAG = (
 
 @dataclass(frozen=True)
 class SearchedFit:
-    """A search around its result.
+    """A fit around its result.
 
     Attributes
     ----------
     fit : Identification
         The result.
-    core : LocalFit
-        The records and the coordinates of the search.
+    core : LocalFit or LocalWeights
+        The records and the coordinates of the search, or of least squares.
     values : ndarray, shape (k,)
         The fitted values in the order of the coordinates, SI.
     names : tuple of str
@@ -60,7 +62,7 @@ class SearchedFit:
     """
 
     fit: Identification
-    core: _core.LocalFit
+    core: Local
     values: Array
     names: dict[int, str]
     factors: dict[str, float]
@@ -71,40 +73,31 @@ class SearchedFit:
 
         Raises
         ------
-        ParameterError
-            The model is not searched.
         DataError
             The record is too short.
         """
-        info = fit.model.info
-        if not info.searched:
-            raise ParameterError(
-                "model",
-                f"'{info.name}'",
-                "one that is searched, as 'dahl': least squares find the weights of plays, and "
-                "Identification.covariance has their intervals",
-            )
-        covariance = fit.covariance
+        info, covariance = fit.model.info, fit.covariance
         if covariance is None:
             count = sum(len(one.data) for one in fit.records if one.data is not None)
             raise DataError(
-                f"the record has {count} samples for {len(_free(fit))} fitted values: too short "
-                "for intervals"
+                f"the record has {count} samples for {len(fitted_values(fit))} fitted values: too "
+                "short for intervals"
             )
-        core = _core.LocalFit(_problem(fit))
+        core: Local = _core.LocalFit(_problem(fit)) if info.searched else LocalWeights(fit)
         several = len(fit.records) > 1
         values, names = [], {}
         for place, (record, name, _, _) in enumerate(core.coordinates):
-            own = fit.records[record].parameters
-            values.append((own if name in own else fit.parameters)[name].value)
-            if name in {one.name for one in info.parameters} or (name == DELAY and not several):
+            value, own = Value.named(name), fit.records[record].parameters
+            values.append(own[name].value if name in own else value.of(fit))
+            of_model = value.parameter in {one.name for one in info.parameters}
+            if of_model or (name == DELAY and not several):
                 names[place] = name
         return cls(fit, core, np.array(values), names, _factors(covariance, names))
 
     def at(self, least: list[float]) -> Self:
         """Return the same with the factors at other values, where there is a covariance there."""
         places = [place for place, name in self.names.items() if name != DELAY]
-        values = [Value(self.names[place]) for place in places]
+        values = [Value.named(self.names[place]) for place in places]
         changes = np.array([least[place] - self.values[place] for place in places])
         nearby = moved(self.fit, values, changes)
         records = [(one.data, one.weight) for one in self.fit.records if one.data is not None]
@@ -128,7 +121,9 @@ class SearchedFit:
     def freedom(self) -> int:
         """Samples less what was fitted, with the offset and the drift of each record."""
         own = sum(int(one.offset_fitted) + bool(one.drift) for one in self.fit.records)
-        creep = len([one for one in self.fit.model.creep_weights if one > 0.0])
+        # Least squares have the weights of the creep among their values.
+        weights = self.fit.model.creep_weights if self.fit.model.info.searched else ()
+        creep = len([one for one in weights if one > 0.0])
         return self.samples - len(self.values) - own - creep
 
     @property
@@ -137,8 +132,22 @@ class SearchedFit:
         return self.core.cost(self.values.tolist())
 
     def estimate(self, name: str) -> Estimate:
-        """Return the estimate of a parameter."""
-        return self.fit.parameters[name]
+        """Return the estimate of a parameter, or of an entry of a list."""
+        if name in self.fit.parameters:
+            return self.fit.parameters[name]
+        value = Value.named(name)
+        known = {one.name: (one.unit, one.symbol) for one in self.fit.model.info.parameters}
+        unit, symbol = known.get(value.parameter, ("s", "tau"))
+        entry = "" if value.entry is None else str(value.entry + 1)
+        return Estimate(
+            value=value.of(self.fit),
+            unit=unit,
+            symbol=symbol + entry,
+            free=True,
+            bounds=None,
+            deviation=None,
+            at_bound=False,
+        )
 
     def beside(
         self, least: list[float], cost: float, rise: float
@@ -185,10 +194,6 @@ def _factors(covariance: Covariance, names: dict[int, str]) -> dict[str, float]:
     """Return the factor of each; of those without one the largest."""
     known = dict(zip(covariance.names, covariance.factors.tolist(), strict=True))
     return {name: known.get(name, max(known.values())) for name in names.values()}
-
-
-def _free(fit: Identification) -> list[str]:
-    return [name for name, one in fit.parameters.items() if one.free]
 
 
 def _problem(fit: Identification) -> Problem:

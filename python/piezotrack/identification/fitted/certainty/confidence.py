@@ -39,7 +39,7 @@ class ParameterInterval:
     interval : Interval
         Its ends, SI; infinite where the cost stays below the threshold up to the bound.
     bounds : (float, float) or None
-        Of the search, SI; None where the parameter is tied to others.
+        Of the search or of the weights, SI; None where the parameter is tied to others.
     on_bound : bool
         Whether the value lies on a bound: the interval is then one-sided.
     shape : {"bounded", "open below", "open above", "flat", "several minima"} or None
@@ -91,7 +91,7 @@ class LowerMinimum:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Confidence(Result):
-    r"""Intervals of confidence of what a search fitted.
+    r"""Intervals of confidence of what was fitted.
 
     From profiles: with a parameter held, all others and the offset, drift and history of each
     record are fitted again. The interval has the values at which the cost f is not above
@@ -111,7 +111,8 @@ class Confidence(Result):
     level : float
         Their level.
     parameters : dict of str to ParameterInterval
-        The parameters of the model that were searched, and the delay of one record.
+        The parameters of the model that were fitted, entries of lists as ``"weights[2]"``, and
+        the delay of one record.
     cost : float
         Least cost [m], with the priors where there are any.
     lower : LowerMinimum or None
@@ -183,7 +184,7 @@ class Confidence(Result):
         Returns
         -------
         dict
-            Of numbers, texts, lists and dicts only; None for an end that is open.
+            Of numbers, texts, lists and dicts only; None for an end or a bound that is open.
         """
 
         def end(value: float) -> float | None:
@@ -194,7 +195,7 @@ class Confidence(Result):
                 "value": one.value,
                 "unit": one.unit,
                 "interval": [end(one.interval.lower), end(one.interval.upper)],
-                "bounds": None if one.bounds is None else list(one.bounds),
+                "bounds": None if one.bounds is None else [end(bound) for bound in one.bounds],
                 "on_bound": one.on_bound,
                 "shape": one.shape,
                 "variance_factor": one.factor,

@@ -11,3 +11,4 @@ pub use autoregression::Autoregression;
 pub use covariance::{Covariance, covariance};
 pub use linearised::Linearised;
 pub(in crate::identify) use sieve::Sieve;
+pub use sieve::resampled_noises;

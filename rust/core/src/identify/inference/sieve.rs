@@ -38,3 +38,14 @@ impl Sieve {
         self.noise.noise(&drawn, leading)
     }
 }
+
+/// Noises like one, their variance times `scale`.
+#[must_use]
+pub fn resampled_noises(noise: &[f64], scale: f64, (draws, seed): (u32, u64)) -> Vec<Vec<f64>> {
+    let sieve = Sieve::of(noise);
+    let drawn = |draw| {
+        let mut stream = Draws::at(seed, u64::from(draw), 0, 0, 1);
+        sieve.drawn(noise.len(), scale, &mut stream)
+    };
+    (0..draws).map(drawn).collect()
+}
