@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -185,6 +186,27 @@ def test_a_set_of_many_plants_that_no_gains_keep_is_refused_in_one_sentence() ->
     with pytest.raises(pt.ParameterError) as refused:
         pt.tune(noisy(0, KINDS[0]), MOTIONS["sine"], timing=TIMING, spread=spread, **given)
     assert re.fullmatch(words, str(refused.value))
+
+
+def test_the_gains_are_tried_on_a_stage_of_another_kind_of_the_same_record() -> None:
+    fit = fitted(0, KINDS[0])
+    lowest = float(fit.data.y.min())
+    line = pt.triangle(frequency=1.0, low=lowest + 8e-6, high=lowest + 38e-6, duration=3.0)
+    found = pt.tune(fit, line, timing=TIMING, parts="pid", search=QUICK)
+    assert found.other_kind is not None
+    model, left = found.other_kind
+    assert model == "bouc-wen"
+    other = pt.identify(logs()[0][:10.0], model)
+    # Both begin at the same reading.
+    stage = replace(pt.VirtualStage.of(other), sensor=pt.VirtualStage.of(fit).sensor)
+    run = pt.track(stage, found.controller, line, timing=TIMING, unstable=True, beyond_reach=True)
+    assert left == pytest.approx(run.metrics.rms_error, rel=0.1)
+    assert left < 3.0 * found.value
+    assert f"on a bouc-wen stage fitted to the same record: {1e6 * left:.4g} um rms" in str(found)
+    assert found.document()["other_kind"]["rms_error"] == left
+    # A stage alone has no record.
+    bare = pt.tune(fit.model, MOTIONS["triangle"], dt=DT, limits=LIMITS, search=QUICK)
+    assert bare.other_kind is None
 
 
 def test_the_farthest_points_are_no_farther_from_the_others_than_twice_the_least() -> None:

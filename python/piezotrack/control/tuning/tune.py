@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
+from ...references.reference import Reference
 from ..loop.contouring import contour
 from ..loop.stability import check_loop
 from ..running.track import track
 from .goal import MINIMISED
+from .model_set.other_kind import tried_on_other_kind
 from .problem import TuningProblem
 from .refusal import refusal
 from .search import Solution, search_at
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ...identification.fitted.identified_model import IdentifiedModel
-    from ...references.reference import Reference
     from ...references.xy_reference import XYReference
     from ...stages.inverse import Inverse
     from ...stages.xy import XYStage
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from ..timing import Timing
     from .goal import Goal, TuningSearch
     from .margins import Margins, Spread
+    from .model_set.other_kind import OtherKind
     from .structures import LawName
 
 __all__ = ["TuneOptions", "tune"]
@@ -209,11 +211,18 @@ def _simulated(problem: TuningProblem, best: Solution, solutions: list[Solution]
         history=tuple(best.outcome["history"]),
         searches=best.outcome["searches"],
         agreeing=best.outcome["agreeing"],
+        other_kind=_on_other_kind(problem, best),
         bandwidths=tuple(
             check_loop(axis.stages[0], controller, delay=axis.timing.delay).middle.bandwidth
             for axis, controller in zip(problem.axes, controllers, strict=True)
         ),
     )
+
+
+def _on_other_kind(problem: TuningProblem, best: Solution) -> OtherKind | None:
+    """Try the gains on a stage of another kind, of the same record."""
+    references = [one for one in problem.references if isinstance(one, Reference)]
+    return tried_on_other_kind(problem.axes[0], best.controllers[0], references)
 
 
 def _minimised(problem: TuningProblem) -> str:

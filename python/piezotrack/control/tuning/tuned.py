@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ..loop.tracking import Tracking
     from ..parts.part import FeedbackLaw
     from .margins import Margins
+    from .model_set.other_kind import OtherKind
 
 __all__ = ["MARGIN_UNITS", "MarginReport", "Tuned", "motion_of", "picture_name"]
 
@@ -130,6 +131,9 @@ class Tuned(Result):
     bandwidths : tuple of (float or None)
         Bandwidth of the feedback of each controller on the stage at its middle gain [Hz], as of
         `check_loop`.
+    other_kind : OtherKind or None
+        Name of a model of another kind, fitted to the record of the first stage, and the rms error
+        that these gains leave on it; None without a record.
     """
 
     views: ClassVar[Mapping[str, str]] = {
@@ -152,6 +156,7 @@ class Tuned(Result):
     agreeing: int
     bandwidths: tuple[float | None, ...]
     unit: str = "m"
+    other_kind: OtherKind | None = None
 
     @property
     def controller(self) -> Controller:
@@ -208,6 +213,7 @@ class Tuned(Result):
             "binding": list(self.active_constraints),
             "controllers": self.candidates,
             "loops": self.loops,
+            "other_kind": None if self.other_kind is None else self.other_kind._asdict(),
             "searches": self.searches,
             "agreeing": self.agreeing,
             "provenance": {"package": "piezotrack", "version": _core.__version__},

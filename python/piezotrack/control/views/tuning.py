@@ -59,6 +59,9 @@ def tuned_text(tuned: Tuned) -> str:
         seen = "" if measured == true else "measured "
         lines.append(f"{motion_of(run)!r}: {seen}{word}{run.metrics}")
         lines += [f"  true {word}{true}"] if seen else []
+    if tuned.other_kind is not None:
+        model, error = tuned.other_kind
+        lines.append(f"on a {model} stage fitted to the same record: {1e6 * error:.4g} um rms")
     lines += _bandwidths(tuned)
     lines.append(f"over {len(tuned.plants)} plants:")
     lines += [f"  {one}" for one in tuned.kept]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["followers_of", "middle_gain", "open_loop", "start_of"]
+__all__ = ["followers_of", "middle_gain", "open_loop", "start_of", "with_zero"]
 
 
 def followers_of(axis: Axis) -> list[VirtualStage]:
@@ -29,17 +29,16 @@ def followers_of(axis: Axis) -> list[VirtualStage]:
     A model without an apparatus gets amplifier, sensor and preconditioning of the first; the delay
     of its sensor is its own.
     """
-    first = plant_of(axis.stages[0])
-    begins = start_of(axis, first)
-    return [first, *(_with_zero(axis, first, stage, begins) for stage in axis.stages[1:])]
+    return [plant_of(axis.stages[0]), *(with_zero(axis, stage) for stage in axis.stages[1:])]
 
 
-def _with_zero(axis: Axis, first: VirtualStage, stage: Any, begins: float) -> VirtualStage:
-    plant = plant_of(stage)
+def with_zero(axis: Axis, stage: Any) -> VirtualStage:
+    """Return a stage with the zero of the first of an axis, and a model with its apparatus."""
+    first, plant = plant_of(axis.stages[0]), plant_of(stage)
     if not isinstance(stage, VirtualStage):
         sensor = replace(first.sensor, delay=plant.sensor.delay, offset=plant.sensor.offset)
         plant = replace(first, stage=plant.stage, sensor=sensor)
-    offset = plant.sensor.offset + begins - start_of(axis, plant)
+    offset = plant.sensor.offset + start_of(axis, first) - start_of(axis, plant)
     return replace(plant, sensor=replace(plant.sensor, offset=offset))
 
 
