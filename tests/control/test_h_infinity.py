@@ -115,3 +115,37 @@ def test_without_slycot_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(pt.ParameterError, match=r"needs slycot: .*piezotrack\[robust\]"):
         mixed_sensitivity(STAGE, dt=1e-3, limits=LIMITS, bandwidth=10.0)
+
+
+def test_a_law_that_holds_its_state_under_saturation_is_named() -> None:
+    """A root outside the unit circle that C misses has no stable gain of back-calculation."""
+    held = pt.control.StateSpace([[0.9, 0.0], [0.0, 1.01]], [0.0, 2000.0], [1.0, 0.0], d=1e4)
+    integrator = pt.control.StateSpace([[1.0]], [2000.0], [1.0])
+    for law, holds in ((held, True), (integrator, False)):
+        report = pt.check_loop(STAGE, pt.Controller(dt=1e-3, limits=LIMITS, feedback=law))
+        assert report.holds_state is holds
+        assert ("held" in report.summary()) is holds
+        assert report.design().get("antiwindup") == ("held state" if holds else None)
+
+
+def test_a_compared_law_keeps_the_phase_margin() -> None:
+    """More phase than Ms implies costs bandwidth."""
+    reference = [pt.sine(frequency=2.0, low=20e-6, high=60e-6, duration=3.0)]
+    crossovers: list[float] = []
+    for phase in (0.5, 1.3):
+        found = pt.compare_controllers(
+            STAGE,
+            pt.stages.DahlStage.xu_li_2010(),
+            dt=1e-3,
+            limits=LIMITS,
+            references=reference,
+            controllers=["inverse + H-infinity"],
+            margins=pt.Margins(phase=phase),
+            seeds=1,
+        )
+        report = pt.check_loop(STAGE, found.rows[0].controller)
+        for case in (report.low, report.middle, report.high):
+            assert case.phase_margin is not None
+            assert case.phase_margin >= phase
+        crossovers.append(report.high.crossover or math.inf)
+    assert crossovers[1] < crossovers[0]

@@ -17,7 +17,7 @@ def loop_text(report: LoopReport) -> str:
         lines.append(f"hint: {report.middle.hint}")
     if report.holds_state:
         lines.append(
-            "antiwindup: no gain of back-calculation is stable; the state is held while the command "
-            "is clipped"
+            "antiwindup: no gain of back-calculation is stable; the state is held while the "
+            "command is clipped"
         )
     return "\n".join(lines)

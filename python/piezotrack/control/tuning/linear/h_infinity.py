@@ -93,8 +93,8 @@ def mixed_sensitivity(
 
     with the bandwidth, the largest sensitivity M, the effort m and the frequency of the roll-off:
     Skogestad and Postlethwaite, Multivariable Feedback Control, 2nd edition, 2005, sections 2.8
-    and 9.3. The weight of the effort rises with frequency, and the law is that of a gamma 10 % above
-    the least, as the law of the least one has a pole near -1: both keep noise from the voltage.
+    and 9.3. The weight of the effort rises with frequency, and the law has a gamma 10 % above the
+    least, as the law of the least one has a pole near -1: both keep noise from the voltage.
 
     The stage is linearised at its middle gain and sampled exactly, with hold and delay, and the
     design is made in the plane of the bilinear transform, in which that is a continuous system.
