@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 DT, LIMITS = 0.02, (0.0, 75.0)
 COLOURS = {"published gains": "#c0341d", "tuned gains": "#1b6ca8"}
-# What is asked for: the default of `pt.Margins`.
-ASKED = (2.0, math.degrees(0.5), 2.0)
+# What is asked for, in dB, degrees and as a factor: the default of `pt.Margins`.
+ASKED = (20.0 * math.log10(2.0), math.degrees(0.5), 2.0)
 
 
 def model(stage: pt.VirtualStage) -> pt.identification.Identification:
@@ -83,22 +83,24 @@ def main() -> None:
     error.legend(fontsize="small")
     for k in range(3):
         margins.plot([k - 0.45, k + 0.45], [1.0, 1.0], "k--", lw=1.0)
-    labels = ("gain margin\n(at least {:.3g})", "phase margin\n(at least {:.3g} deg)")
+    labels = ("gain margin\n(at least {:.3g} dB)", "phase margin\n(at least {:.3g} deg)")
     words = [one.format(bound) for one, bound in zip(labels, ASKED, strict=False)]
     margins.set_xticks(range(3), [*words, f"Ms\n(at most {ASKED[2]:.3g})"], fontsize="x-small")
-    margins.set(ylabel="as a multiple of what was asked for", ylim=(0.0, None))
-    margins.margins(y=0.15)
+    highest = 1.1 * margins.get_ylim()[1]
+    margins.set(ylabel="as a multiple of what was asked for", ylim=(0.0, highest))
     figure.savefig(out / "tuning.png", dpi=100)
 
 
 def bars(ax: Axes, loop: pt.control.LoopCheck, name: str, k: int) -> None:
     """Draw gain margin, phase margin and sensitivity over what was asked for."""
     gain, phase = loop.gain_margin or math.inf, loop.phase_margin or math.pi
-    values = (gain, math.degrees(phase), loop.sensitivity)
+    values = (20.0 * math.log10(gain), math.degrees(phase), loop.sensitivity)
     at = np.arange(3.0) + (0.4 * k - 0.2)
     heights = [value / bound for value, bound in zip(values, ASKED, strict=True)]
     drawn = ax.bar(at, heights, 0.38, color=COLOURS[name], label=name)
-    ax.bar_label(drawn, [f"{value:.3g}" for value in values], fontsize="small")
+    words = [f"{value:.3g}" for value in values]
+    white = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
+    ax.bar_label(drawn, words, fontsize="small", padding=2, bbox=white)
 
 
 if __name__ == "__main__":

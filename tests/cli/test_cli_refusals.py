@@ -192,7 +192,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     f"{TUNE} --parts repetitive": ("parts has 'repetitive'", "references that repeat"),
     f"{TUNE} --noise-nm -1": ("--noise-nm is -1", "0 or above"),
     f"{TUNE} --bandwidth 0": ("bandwidth is 0", "above 0"),
-    f"{TUNE} --gain-margin nan": ("--gain-margin is nan", "above 1"),
+    f"{TUNE} --gain-margin nan": ("--gain-margin is nan", "above 0 and below 400"),
     f"{TUNE} --delay 1e9": ("delay is 1e+09 s in all", "expected 2000 s at most"),
     "tune gone.json": ("gone.json: no such file",),
     "tune log.csv": ("log.csv:1: not JSON",),

@@ -179,6 +179,12 @@ def track_command(
     refuse_of_other_stage(context, of_model)
     if of_model and not (noise_nm or jitter):
         refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
+    settings = Loop(of_model, dt, limits, feedback, kp, ti, td, tt)
+    settings.check(context)
+    if not feedforward:
+        refuse_without_effect(context, ["online"], "with --no-feedforward")
+    if not repetitive:
+        refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
     sensor: dict[str, Any] = {
         "noise": noise_metres(noise_nm),
         "bandwidth": bandwidth,
@@ -193,14 +199,8 @@ def track_command(
         begun = read_zero(plant) if zero else None
         _simulate(result, plant, loop, desired, timing, free, known, name, stage, begun)
         return
-    settings = Loop(of_model, dt, limits, feedback, kp, ti, td, tt)
-    settings.check(context)
-    if not feedforward:
-        refuse_without_effect(context, ["online"], "with --no-feedforward")
     if not (feedforward or repetitive or settings.has_feedback):
         raise ParameterError("--no-feedforward: expected --kp and --ti, or nothing moves the stage")
-    if not repetitive:
-        refuse_without_effect(context, ["kq", "tq"], "without --repetitive")
     known = known_model(model, zero=zero, paper=not of_model)
     playback: Literal["table", "online"] = "online" if online else "table"
     loop = Controller(

@@ -22,7 +22,7 @@ def tracking_text(run: Tracking) -> str:
     since = f"from {run.settled:g} s on" if run.settled else "all of it"
     lines.append(f"{since}: {run.metrics}")
     if not np.array_equal(run.measured, run.displacement):
-        lines.append(f"true, without the sensor's: {ErrorStatistics.__str__(run.score(true=True))}")
+        lines.append(f"true: {ErrorStatistics.__str__(run.score(true=True))}")
     if run.saturated.any():
         lines.append(f"clipped in {100.0 * run.saturated.mean():.1f} % of the samples")
     if run.periods:
