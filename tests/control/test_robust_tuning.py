@@ -117,6 +117,30 @@ def test_tuned_gains_are_not_worse_than_a_rule_on_stages_of_another_log(seed: in
     assert (back[:, 0] < 1.05 * back[:, 1:].min(axis=1)).all()
 
 
+@pytest.mark.slow
+def test_likely_models_cost_no_integral_action() -> None:
+    """The fit with its posterior models and a spread: 774 plants."""
+    fit = fitted(0, KINDS[0])
+    nearby = [one.model for one in pt.identification.posterior_models(fit, logs()[0])]
+    stages = [noisy(0, KINDS[0]), *nearby]
+    spread = pt.Spread(delay=(0.0, 2e-3), gain=0.1)
+    found = pt.tune(
+        stages, list(MOTIONS.values()), timing=TIMING, margins=pt.Margins(sensitivity=1.6),
+        parts=("pid", "low-pass"), spread=spread, **known(0),
+    )  # fmt: skip
+    plants = plants_of(stages, LIMITS, TIMING.delay, spread)
+    assert len(found.plants) == len(plants)
+    for one in plants:
+        check = _core.check_loop(found.controller._core, one.plant)
+        assert check["stable"]
+        assert check["sensitivity"] < 1.6 * 1.004
+    # A law that keeps these margins too, of the same structure.
+    plain = pt.Controller(feedback=pt.Pid(kp=0.04e6, ti=0.014), **known(0))
+    for kind in KINDS:
+        for motion in MOTIONS:
+            assert error(1, kind, motion, found.controller) < error(1, kind, motion, plain)
+
+
 def test_much_noise_does_not_take_the_integral_action() -> None:
     stage = noisy(0, KINDS[0], noise=0.5e-6)
     line = MOTIONS["triangle"]

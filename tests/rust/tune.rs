@@ -307,3 +307,57 @@ fn margins_with_two_integrators_are_the_exact_ones() {
     }
     assert!(stable > 4 && unstable > 2, "{stable} {unstable}");
 }
+
+/// The cost over two stages is that of the worse one, at any place of the box; and a low-pass with a
+/// cutoff above two sampling rates is left out.
+#[test]
+fn the_worst_stage_counts_and_a_fast_low_pass_is_left_out() {
+    let stages = [VirtualStage::xu_li_2010(1), VirtualStage::xu_li_2010(2)];
+    let reference = reference(750);
+    let feedforward = vec![0.0; 750];
+    let samples = ReferenceSamples { reference: &reference, feedforward: &feedforward };
+    let limits = Limits::new(0.0, 75.0).unwrap();
+    let plants = stages[0].loop_plants(0.0, 75.0).unwrap();
+    let cutoff = Sought { setting: Setting::Cutoff, low: 1.0, high: 200.0, logarithmic: true };
+    let template = Template {
+        base: Controller::new(limits, Law::None),
+        dt: DT,
+        period: None,
+        sign: 1.0,
+        structure: Structure::Pid,
+    };
+    let tuning = |chosen: &[usize]| {
+        let judge = |i: &usize| Judge::Axis(task(&stages[*i], samples, 0.0));
+        let axis = SoughtController {
+            sought: [sought(1.56e-6), vec![cutoff]].concat(),
+            template,
+            plants: PlantSet::new(&plants, DT).unwrap(),
+        };
+        Tuning {
+            axes: vec![axis],
+            tasks: chosen.iter().map(judge).collect(),
+            stages: chosen.len(),
+            required: Requirements { largest_saturation: 1.0, ..required() },
+            aim: Aim::Rms,
+            effort: 0.0,
+            particles: 8,
+            iterations: 1,
+            seed: 1,
+            starts: Vec::new(),
+        }
+    };
+    let places = [vec![0.7, 0.6, 0.3, 1.0], vec![0.6, 0.6, 0.3, 0.9], vec![0.65, 0.65, 0.2, 0.8]];
+    let costs = |chosen: &[usize]| tuning(chosen).costs(&places, NEVER).unwrap();
+    let (both, first, second) = (costs(&[0, 1]), costs(&[0]), costs(&[1]));
+    for ((both, first), second) in both.iter().zip(&first).zip(&second) {
+        assert!(both.0 <= 1.0 && first.1.is_finite());
+        assert_eq!(both.1.to_bits(), first.1.max(second.1).to_bits());
+        assert_ne!(first.1.to_bits(), second.1.to_bits());
+    }
+    let at = |cutoff| {
+        let settings = [(Setting::Proportional, 1e5), (Setting::Cutoff, cutoff / DT)];
+        template.controller(&settings).unwrap().filters[0].is_some()
+    };
+    assert!(at(1.99) && !at(2.01));
+    assert!(Tuning { stages: 2, ..tuning(&[0]) }.costs(&places, NEVER).is_err());
+}
