@@ -217,6 +217,7 @@ fn the_integral_gain_from_margins_alone_is_the_known_one() {
         stages: 1,
         required: Requirements { phase_margin: 0.0, gain_margin: 1.001, ..required() },
         aim: Aim::Disturbance,
+        tolerances: Vec::new(),
         effort: 0.0,
         particles: 20,
         iterations: 100,
@@ -339,6 +340,7 @@ fn the_worst_stage_counts_and_a_fast_low_pass_is_left_out() {
             stages: chosen.len(),
             required: Requirements { largest_saturation: 1.0, ..required() },
             aim: Aim::Rms,
+            tolerances: Vec::new(),
             effort: 0.0,
             particles: 8,
             iterations: 1,
@@ -360,4 +362,16 @@ fn the_worst_stage_counts_and_a_fast_low_pass_is_left_out() {
     };
     assert!(at(1.99) && !at(2.01));
     assert!(Tuning { stages: 2, ..tuning(&[0]) }.costs(&places, NEVER).is_err());
+    // Both as motions of one stage: rms over them, the second one's error ten times as dear.
+    let motions = Tuning { stages: 1, ..tuning(&[0, 1]) };
+    let alike = motions.costs(&places, NEVER).unwrap();
+    let dear = Tuning { tolerances: vec![1e-6, 1e-7], ..motions.clone() };
+    for (i, (_, cost)) in dear.costs(&places, NEVER).unwrap().iter().enumerate() {
+        let (one, other) = (first[i].1, second[i].1);
+        assert!((alike[i].1 - (0.5 * (one * one + other * other)).sqrt()).abs() < 1e-12 * one);
+        let weighted = ((one * one + 100.0 * other * other) / 101.0).sqrt();
+        assert!((cost - weighted).abs() < 1e-12 * one);
+    }
+    let few = Tuning { tolerances: vec![1e-6], ..motions };
+    assert!(few.costs(&places, NEVER).unwrap_err().to_string().contains("tolerances"));
 }

@@ -263,6 +263,7 @@ struct Goal {
     slew: f64,
     largest_error: f64,
     largest_saturation: f64,
+    tolerances: Vec<f64>,
 }
 
 /// Budget and seed, from the attributes of Python's `TuningSearch`.
@@ -297,6 +298,7 @@ impl Problem {
             aim: goal.aim(tasks.len()),
             tasks,
             stages,
+            tolerances: goal.tolerances.clone(),
             effort: goal.effort,
             particles: search.particles,
             iterations: search.iterations,

@@ -31,6 +31,9 @@ class Goal:
     minimise : {"rms", "largest", "effort"}, optional
         What is made small: the rms error over all references, the largest in any, or the rms change
         of the command from sample to sample, within `largest_error`.
+    tolerances : sequence of float, optional
+        Error that is tolerable along each reference [m]: the rms is over the errors in shares of
+        these, so that the hardest motion does not decide alone. By default all count alike.
     error : {"measured", "true"}, optional
         Whether the reading of the sensor counts or the true displacement.
     effort : float, optional
@@ -58,6 +61,7 @@ class Goal:
     """
 
     minimise: Literal["rms", "largest", "effort"] = "rms"
+    tolerances: Sequence[float] = ()
     error: Literal["measured", "true"] = "measured"
     effort: float = 0.0
     slew: float = math.inf
@@ -69,6 +73,7 @@ class Goal:
             if getattr(self, name) not in words:
                 expected = ", ".join(map(repr, words))
                 raise ParameterError(name, quoted(getattr(self, name)), f"one of {expected}")
+        object.__setattr__(self, "tolerances", as_numbers("tolerances", self.tolerances))
         for name in ("effort", "slew", "largest_error", "largest_saturation"):
             object.__setattr__(self, name, _core.as_number(name, getattr(self, name)))
         if self.minimise == "effort" and self.largest_error == math.inf:

@@ -14,7 +14,7 @@ use super::judge::{Judge, Ready};
 use super::requirements::{PlantSet, Requirements, Robustness};
 use super::run_metrics::RunMetrics;
 use super::settings::{Setting, Sought, Template};
-use crate::error::{Error, Result, not_negative};
+use crate::error::{Error, Result, not_negative, positive};
 use crate::parts::Law;
 use crate::signal::{Stop, index};
 
@@ -58,6 +58,9 @@ pub struct Tuning<'a> {
     pub required: Requirements,
     /// Quantity that is made small.
     pub aim: Aim,
+    /// Errors that are tolerable along each motion, m, in shares of which [`Aim::Rms`] counts them;
+    /// where empty all count alike.
+    pub tolerances: Vec<f64>,
     /// Error that a volt (rms) of change from sample to sample is worth, m/V.
     pub effort: f64,
     /// Candidates that each search begins with.
@@ -363,6 +366,14 @@ impl Tuning<'_> {
             let expected = format!("a part of the {} tasks", self.tasks.len());
             return Err(Error::parameter("stages", self.stages, expected));
         }
+        let motions = self.tasks.len() / self.stages;
+        if !self.tolerances.is_empty() && motions > 0 && self.tolerances.len() != motions {
+            let expected = format!("{motions}, one for each reference");
+            return Err(Error::parameter("tolerances", self.tolerances.len(), expected));
+        }
+        for tolerance in &self.tolerances {
+            positive("tolerances", *tolerance, "m")?;
+        }
         if self.tasks.iter().any(|task| task.axes() != self.axes.len()) {
             return Err(Error::parameter("axes", self.axes.len(), "as many as the tasks have"));
         }
@@ -465,6 +476,14 @@ impl Tuning<'_> {
         })
     }
 
+    /// Rms error over the motions, each in shares of what is tolerable, m.
+    fn weighted(&self, all: &[RunMetrics]) -> f64 {
+        let pairs = || all.iter().zip(&self.tolerances);
+        let squares: f64 = pairs().map(|(one, most)| (one.rms / most) * (one.rms / most)).sum();
+        let weights: f64 = pairs().map(|(_, most)| 1.0 / (most * most)).sum();
+        libm::sqrt(squares / weights)
+    }
+
     /// Figure of a stage over its motions, and how far from what is required.
     fn figure_of(&self, all: &[RunMetrics], excess: f64) -> (f64, f64) {
         let count = index(all.len()).max(1.0);
@@ -473,6 +492,7 @@ impl Tuning<'_> {
         };
         let most = |of: fn(&RunMetrics) -> f64| all.iter().map(of).fold(0.0, f64::max);
         let error = match self.aim {
+            Aim::Rms | Aim::Disturbance if !self.tolerances.is_empty() => self.weighted(all),
             Aim::Rms | Aim::Disturbance => mean(|one| one.rms),
             Aim::Largest => most(|one| one.largest),
             Aim::Effort => mean(|one| one.effort),
