@@ -187,6 +187,7 @@ def _keeps(controller: Controller, plant: _core.LoopPlant, margins: Margins) -> 
         loop["stable"]
         and loop["sensitivity"] <= margins.sensitivity
         and (loop["gain_margin"] or math.inf) >= margins.gain
+        and (loop["phase_margin"] or math.inf) >= margins.phase
     )
 
 

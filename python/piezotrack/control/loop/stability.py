@@ -14,6 +14,7 @@ from ..._support.display.result import Result
 from ..._support.units import decibels, shown_unit
 from ...errors import ParameterError
 from ..controller.controller import Controller
+from ..laws.state_space import StateSpace
 from ..plant import linearised_plants, plant_of
 
 if TYPE_CHECKING:
@@ -216,6 +217,16 @@ class LoopReport(Result):
         return f"<LoopReport at {self.middle}{elsewhere}>"
 
     @property
+    def holds_state(self) -> bool:
+        """Whether the law in state space keeps its state while the command is clipped.
+
+        No gain of back-calculation is stable then.
+        """
+        law = self.controller.feedback
+        coefficients = dict(self.controller._core.coefficients())
+        return isinstance(law, StateSpace) and "back" not in coefficients
+
+    @property
     def controllers(self) -> tuple[Controller]:
         """The controller, as a tuple."""
         return (self.controller,)
@@ -233,7 +244,8 @@ class LoopReport(Result):
         dict
             Of numbers, texts, lists and dicts only.
         """
-        return {"by": "check_loop"} | {name: case.margins() for name, case in self.cases}
+        law = {"by": "check_loop"} | ({"antiwindup": "held state"} if self.holds_state else {})
+        return law | {name: case.margins() for name, case in self.cases}
 
     def response(self, count: int = 400) -> LoopResponse:
         """Frequency response at the middle gain, up to half the sampling rate.

@@ -15,4 +15,9 @@ def loop_text(report: LoopReport) -> str:
     lines = [f"{name:<7} {case}" for name, case in report.cases]
     if report.middle.hint:
         lines.append(f"hint: {report.middle.hint}")
+    if report.holds_state:
+        lines.append(
+            "antiwindup: no gain of back-calculation is stable; the state is held while the "
+            "command is clipped"
+        )
     return "\n".join(lines)
