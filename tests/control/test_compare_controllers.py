@@ -12,7 +12,7 @@ import pytest
 import piezotrack as pt
 
 LIMITS = (0.0, 75.0)
-QUICK: dict[str, Any] = {"search": pt.TuningSearch(particles=16, iterations=12)}
+QUICK: dict[str, Any] = {"search": pt.TuningSearch(particles=16, iterations=12), "searches": 1}
 
 
 def plays(gain: float = 1.0) -> pt.stages.PrandtlIshlinskiiStage:
@@ -227,3 +227,59 @@ def test_the_picture_has_a_mark_for_each_reference() -> None:
 def test_wrong_arguments_are_named(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(pt.ParameterError, match=words):
         compared(**changes)
+
+
+def test_errors_are_relative_to_the_inverse_alone_and_no_motion_decides_alone() -> None:
+    """Two motions, one of which leaves ten times the error of the other."""
+    references = [
+        pt.sine(frequency=2.0, low=20e-6, high=60e-6, duration=3.0),
+        pt.sine(frequency=5.0, low=5e-6, high=8e-6, duration=1.2),
+    ]
+    found = compared(references=references, controllers=["inverse", "inverse + PID"], searches=2)
+    inverse, pid = found.rows
+    assert inverse.relative() == pytest.approx(1.0)
+    large, small = (cell.rms / cell.alone for cell in pid.cells[0] if cell is not None)
+    assert pid.relative() == pytest.approx(math.sqrt(0.5 * (large**2 + small**2)))
+    assert len(pid.searches) == 2
+    assert pid.searches[0] == pytest.approx(pid.relative())
+    assert pid.searches[0] <= pid.searches[1]
+    assert inverse.searches == (pytest.approx(1.0),)
+    assert found.document()["controllers"][1]["relative_error"][0] == pid.relative()
+    # Tuned by the rms over both, the smaller motion has less of a say.
+    by_rms = pt.tune(
+        pt.VirtualStage.of(plays(), noise=5e-9, seed=3),
+        references,
+        dt=1e-3,
+        limits=LIMITS,
+        feedforward=plays(1.05).inverse(),
+        goal=pt.Goal(error="true", tolerances=[1e-6, 1e-6]),
+        **{"search": QUICK["search"]},
+    )
+    assert by_rms.value > 0.0
+    for wrong, words in (([1e-6], "1: expected 2"), ([0.0, 1e-6], "tolerances")):
+        with pytest.raises(pt.ParameterError, match=words):
+            pt.tune(
+                plays(),
+                references,
+                dt=1e-3,
+                limits=LIMITS,
+                goal=pt.Goal(tolerances=wrong),
+                **{"search": QUICK["search"]},
+            )
+
+
+@pytest.mark.slow
+def test_a_law_is_not_worse_than_the_law_that_it_contains() -> None:
+    stage = pt.VirtualStage.of(plays(), noise=5e-9, seed=3)
+    containing = {
+        "inverse + PID + notch": "inverse + PID",
+        "inverse + disturbance-observer": "inverse + PID",
+        "inverse + perturbation-estimator": "inverse + sliding-mode",
+    }
+    names = sorted({*containing, *containing.values()})
+    found = pt.compare_controllers(
+        stage, plays(1.05), dt=1e-3, limits=LIMITS, controllers=names, searches=1, seeds=1
+    )
+    error = {row.name: row.relative() for row in found.rows}
+    for law, contained in containing.items():
+        assert error[law] <= 1.03 * error[contained]

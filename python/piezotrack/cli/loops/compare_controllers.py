@@ -67,6 +67,9 @@ def compare_controllers_command(
     seeds: Annotated[
         int, typer.Option(help="Draws of the sensor noise that each controller is judged by.")
     ] = 3,
+    searches: Annotated[
+        int, typer.Option(help="Searches, each with another seed, of which the median is taken.")
+    ] = 3,
     seed: Annotated[int, typer.Option(help="Random seed of the searches and sensor noise.")] = 1,
     json: Json = False,
     quiet: Quiet = False,
@@ -98,6 +101,7 @@ def compare_controllers_command(
         margins=Margins(sensitivity=sensitivity),
         timing=Timing(delay=delay),
         seeds=seeds,
+        searches=searches,
         search=TuningSearch(seed=seed),
     )
     result.show(str(comparison), comparison.document(), comparison.save(out))

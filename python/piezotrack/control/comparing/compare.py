@@ -21,7 +21,7 @@ from ..loop.tracking import can_be_learnt, feedforward_of, first_counted
 from ..plant import plant_of, timing_on
 from ..tuning.margins import Margins, Spread, plants_of
 from .comparison import Cell, ControllerComparison, Row
-from .contenders import CONTENDERS, Entry, Task
+from .contenders import CONTENDERS, TUNED, Entry, Task
 from .variants import Variant, usual_references, variants
 
 if TYPE_CHECKING:
@@ -62,14 +62,16 @@ def compare_controllers(
     spread: Spread | None = None,
     timing: Timing | None = None,
     seeds: int = 3,
+    searches: int = 3,
     **options: Any,
 ) -> ControllerComparison:
     """Compare controllers on one stage.
 
-    Every controller is tuned by `tune` under the same margins for the same references, and then
-    judged by its true error on the stage, on stages with 1.3 and 0.7 times the gain and with 10 %
-    slower dynamics, and with 1 ms more delay, by draws of the sensor's noise other than those that
-    it was tuned with.
+    Every controller is tuned by `tune` under the same margins for the same references, each in
+    shares of the error that the inverse alone leaves there, and then judged by its true error on
+    the stage, on stages with 1.3 and 0.7 times the gain and with 10 % slower dynamics, and with
+    1 ms more delay, by draws of the sensor's noise other than those that it was tuned with. Of
+    several searches, which begin with other seeds, the gains of the median are taken.
 
     Parameters
     ----------
@@ -97,6 +99,8 @@ def compare_controllers(
         As of `tune`.
     seeds : int, optional
         Draws of the sensor's noise that each controller is judged by; it is tuned with one.
+    searches : int, optional
+        Seeds of the search that each is tuned with, from that of `search` on.
     **options
         Further arguments of `tune`, as `search`; `goal` is the rms of the true error by default.
 
@@ -120,7 +124,7 @@ def compare_controllers(
     ...     pt.VirtualStage.of(plays, noise=5e-9), plays, dt=1e-3, limits=(0.0, 75.0),
     ...     references=[pt.sine(frequency=5.0, low=20e-6, high=60e-6, duration=1.2)],
     ...     controllers=["inverse", "inverse + PID"],
-    ...     search=pt.TuningSearch(particles=12, iterations=8),
+    ...     search=pt.TuningSearch(particles=12, iterations=8), searches=1,
     ... )
     >>> [row.name for row in found.rows]
     ['inverse', 'inverse + PID']
@@ -144,11 +148,12 @@ def compare_controllers(
         timing=timing,
         options=options,
     )
-    draws = _counted(seeds)
+    draws, tries = _counted("seeds", seeds), _counted("searches", searches)
+    task = task.relative_to(_alone(task, draws))
     rows, refused = [], {}
     for name in _names(controllers, task):
         try:
-            rows.append(_row(name, CONTENDERS[name](task), task, draws))
+            rows.append(_row(name, task, draws, tries))
         except PiezotrackError as error:
             refused[name] = str(error)
     if not rows:
@@ -163,13 +168,14 @@ def compare_controllers(
         dt=task.dt,
         margins=task.margins,
         seeds=draws,
+        searches=tries,
     )
 
 
-def _counted(seeds: int) -> int:
-    if not 1 <= _core.as_count("seeds", seeds) <= 100:
-        raise ParameterError("seeds", seeds, "1 to 100")
-    return seeds
+def _counted(name: str, count: int) -> int:
+    if not 1 <= _core.as_count(name, count) <= 100:
+        raise ParameterError(name, count, "1 to 100")
+    return count
 
 
 def _references(given: Sequence[Reference] | None) -> list[Reference]:
@@ -202,14 +208,39 @@ def _names(controllers: Sequence[str] | None, task: Task) -> list[str]:
     return [name for name in CONTENDERS if name not in missing]
 
 
-def _row(name: str, entries: list[Entry | None], task: Task, draws: int) -> Row:
+def _alone(task: Task, draws: int) -> list[float]:
+    """Errors of the inverse alone along each reference, rms [m]; NaN where it is refused."""
+    variant, controller = variants(task.stage)[0], task.alone(task.inverse)
+    errors = []
+    for reference in task.references:
+        try:
+            cell = _cell(Entry(controller, reference), variant, task, draws, 1.0, chatters=False)
+        except PiezotrackError:
+            cell = None
+        errors.append(math.nan if cell is None else cell.rms)
+    return errors
+
+
+def _row(name: str, task: Task, draws: int, tries: int) -> Row:
+    """Tune a controller with several seeds, and take that of the median."""
+    rows = [_judged(name, task.searched(k), draws) for k in range(tries if name in TUNED else 1)]
+    rows.sort(key=Row.relative)
+    best = rows[(len(rows) - 1) // 2]
+    return best._replace(searches=tuple(row.relative() for row in rows))
+
+
+def _judged(name: str, task: Task, draws: int) -> Row:
     """Judge a controller by all references, on all variants of the stage."""
+    entries = CONTENDERS[name](task)
     first = next((entry for entry in entries if entry is not None), None)
     if first is None:
         words = "references: expected one at least that it can learn, which repeats"
         raise ParameterError(words, argument="references")
     cells = [
-        tuple(_cell(entry, variant, task, draws, chatters=i == 0) for entry in entries)
+        tuple(
+            _cell(entry, variant, task, draws, alone, chatters=i == 0)
+            for entry, alone in zip(entries, task.errors_alone, strict=True)
+        )
         for i, variant in enumerate(variants(task.stage))
     ]
     sensitivity, margin = _robustness(first.controller, task)
@@ -220,11 +251,18 @@ def _row(name: str, entries: list[Entry | None], task: Task, draws: int) -> Row:
         sensitivity=sensitivity,
         gain_margin=margin,
         step_time=first.controller._core.step_time(TIMED),
+        searches=(),
     )
 
 
 def _cell(
-    entry: Entry | None, variant: Variant, task: Task, draws: int, *, chatters: bool
+    entry: Entry | None,
+    variant: Variant,
+    task: Task,
+    draws: int,
+    alone: float,
+    *,
+    chatters: bool,
 ) -> Cell | None:
     """Simulate a controller along a reference: its true errors once it has settled."""
     if entry is None:
@@ -243,7 +281,7 @@ def _cell(
     if chatters and all(map(math.isfinite, rms)):
         run = run_closed_loop(stages[0], entry.controller, samples.x, voltage, timing, 1)
         chatter = chatter_of(run.part("volts")[first:]).fast_change
-    return Cell(rms, max(largest), fmean(effort), fmean(clipped), chatter)
+    return Cell(rms, max(largest), fmean(effort), fmean(clipped), chatter, alone)
 
 
 def _drawn(stage: VirtualStage, k: int) -> VirtualStage:

@@ -41,6 +41,9 @@ class Cell(NamedTuple):
     chatter : float or None
         The part of these changes above a quarter of the sampling rate, rms [V], with the first
         draw; on the stage that the controllers were tuned for only.
+    alone : float
+        True rms error with the inverse alone along that reference, on the stage that the
+        controllers were tuned for [m].
     """
 
     draws: tuple[float, ...]
@@ -48,6 +51,7 @@ class Cell(NamedTuple):
     effort: float
     clipped: float
     chatter: float | None
+    alone: float
 
     @property
     def rms(self) -> float:
@@ -76,6 +80,9 @@ class Row(NamedTuple):
         Over the set of plants; None without feedback.
     step_time : float
         Of a step of the controller [s], measured here, without its feedforward.
+    searches : tuple of float
+        `relative` of the gains that each seed of the search ends with, ascending; those of the
+        median are the controller's. One where nothing is searched.
     """
 
     name: str
@@ -84,6 +91,26 @@ class Row(NamedTuple):
     sensitivity: float | None
     gain_margin: float | None
     step_time: float
+    searches: tuple[float, ...]
+
+    def relative(self, variant: int = 0) -> float:
+        """Error relative to that with the inverse alone, over the references that it follows.
+
+        Parameters
+        ----------
+        variant : int, optional
+            Which stage, a place in `ControllerComparison.variants`; the inverse is on the first.
+
+        Returns
+        -------
+        float
+            Root of the mean square of the ratios, so that no motion decides alone; NaN where it
+            follows none.
+        """
+        followed = [one for one in self.cells[variant] if one is not None]
+        if not followed:
+            return math.nan
+        return math.sqrt(fmean((one.rms / one.alone) ** 2 for one in followed))
 
     def rms(self, variant: int = 0) -> float:
         """Rms error over the references that it follows, mean over the draws of the noise.
@@ -160,6 +187,8 @@ class ControllerComparison(Result):
         Margins that every feedback keeps.
     seeds : int
         Draws of the sensor's noise with which each controller was evaluated.
+    searches : int
+        Seeds of the search with which each was tuned.
     """
 
     views: ClassVar[Mapping[str, str]] = {
@@ -175,6 +204,7 @@ class ControllerComparison(Result):
     dt: float
     margins: Margins
     seeds: int
+    searches: int
 
     def __repr__(self) -> str:
         return f"<ControllerComparison of {len(self.rows)} controllers>"
@@ -194,12 +224,17 @@ class ControllerComparison(Result):
             "references": list(self.references),
             "variants": list(self.variants),
             "seeds": self.seeds,
+            "searches": self.searches,
             "unit": "errors in m, effort and chatter in V; null where a loop diverged",
             "controllers": [
                 {
                     "name": row.name,
                     "sensitivity": row.sensitivity,
                     "gain_margin_dB": _decibels(row.gain_margin),
+                    "relative_error": [
+                        _finite_or_none(row.relative(i)) for i in range(len(row.cells))
+                    ],
+                    "relative_error_of_searches": [_finite_or_none(one) for one in row.searches],
                     "figures": [
                         [None if one is None else _figures_of(one) for one in variant]
                         for variant in row.cells

@@ -15,14 +15,14 @@ from ..laws.hysteresis_observer import HysteresisObserver
 from ..laws.neural_network import train_network
 from ..learning.learn import learn
 from ..loop.tracking import can_be_learnt
-from ..tuning.goal import Goal
+from ..tuning.goal import Goal, TuningSearch
 from ..tuning.linear.h_infinity import mixed_sensitivity
 from ..tuning.margins import Margins, Spread, plants_of
 from ..tuning.schedule import schedule
 from ..tuning.tune import tune
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["CONTENDERS", "Entry", "Task"]
+__all__ = ["CONTENDERS", "TUNED", "Entry", "Task"]
 
 # Shares of the gains of a PID alone that one around an observer is tried with.
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.25, 0.1, 0.03)
@@ -91,6 +91,8 @@ class Task:
         Of the loop.
     options : dict
         Further arguments of `tune`.
+    errors_alone : tuple of float
+        True rms error with the inverse alone along each reference [m].
     """
 
     stage: VirtualStage
@@ -104,9 +106,27 @@ class Task:
     spread: Spread
     timing: Timing
     options: dict[str, Any]
+    errors_alone: tuple[float, ...] = ()
+
+    def relative_to(self, errors: Sequence[float]) -> Task:
+        """Count the error along each reference in shares of that with the inverse alone [m]."""
+        goal = self.options.get("goal", TRUE_ERROR)
+        if not goal.tolerances and all(0.0 < one < math.inf for one in errors):
+            goal = replace(goal, tolerances=tuple(errors))
+        return replace(self, errors_alone=tuple(errors), options={**self.options, "goal": goal})
+
+    def searched(self, k: int) -> Task:
+        """Take another seed for the search."""
+        search = self.options.get("search") or TuningSearch()
+        search = replace(search, seed=search.seed + k)
+        return replace(self, options={**self.options, "search": search})
 
     def tuned(self, references: Any = None, inverse: Any = "model", **changes: Any) -> Controller:
         """Tune a controller for the references: for all of them by default."""
+        if references is not None:
+            # Of one, all of the error counts.
+            goal = self.options["goal"]
+            changes = {"goal": replace(goal, tolerances=()), **changes}
         return tune(
             self.stage,
             self.references if references is None else references,
@@ -116,7 +136,7 @@ class Task:
             margins=self.margins,
             spread=self.spread,
             timing=self.timing,
-            **{"goal": TRUE_ERROR, "parts": ("pid", "low-pass"), **self.options, **changes},
+            **{"parts": ("pid", "low-pass"), **self.options, **changes},
         ).controller
 
     def alone(self, inverse: Inverse) -> Controller:
@@ -212,7 +232,7 @@ def _scheduled(task: Task) -> list[Entry | None]:
         margins=task.margins,
         spread=task.spread,
         timing=task.timing,
-        **{"goal": TRUE_ERROR, **task.options},
+        **{**task.options, "goal": replace(task.options["goal"], tolerances=())},
     )
     return task.each(scheduled.controller)
 
@@ -289,3 +309,5 @@ CONTENDERS: dict[str, Maker] = {
     "inverse + PID + repetitive": _repetitive,
     "inverse + PID + learning": _learnt,
 }
+# Those that a search tunes.
+TUNED = frozenset(CONTENDERS) - {"inverse", "network", "inverse + H-infinity"}

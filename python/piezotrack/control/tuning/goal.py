@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from ... import _core
+from ..._support.arguments import as_numbers
 from ..._support.messages import quoted
 from ...errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 __all__ = ["MINIMISED", "Goal", "TuningSearch"]
 

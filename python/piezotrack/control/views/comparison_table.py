@@ -39,6 +39,7 @@ def grids(comparison: ControllerComparison, *, spreads: bool = True) -> list[Gri
     With standard deviations beside the means, of several draws, where `spreads`.
     """
     rows, several = comparison.rows, comparison.seeds > 1
+    searched = comparison.searches > 1
     many = f"mean of {comparison.seeds} draws of the noise" if several else "one draw of the noise"
     names = [short(one) for one in comparison.references]
 
@@ -63,15 +64,15 @@ def grids(comparison: ControllerComparison, *, spreads: bool = True) -> list[Gri
             ],
         ),
         Grid(
-            "on the stage that they were tuned for, errors over all references",
-            ["rms nm", *FIGURES] if not several else ["rms nm", "deviation nm", *FIGURES],
-            [(row.name, _figures(row, several=several)) for row in rows],
+            "on the stage that they were tuned for, errors relative to those of the inverse alone",
+            ["error %", *(["of searches %"] if searched else []), *FIGURES],
+            [(row.name, _figures(row, searched=searched)) for row in rows],
         ),
         Grid(
-            "on each stage, true error in nm rms over all references",
+            "on each stage, errors in % of those of the inverse alone on the first",
             list(comparison.variants),
             [
-                (row.name, [mean(row.rms(i), row.spread(i)) for i in range(len(row.cells))])
+                (row.name, [_percent(row.relative(i)) for i in range(len(row.cells))])
                 for row in rows
             ],
         ),
@@ -119,11 +120,12 @@ def _significant(value: float, digits: int) -> float:
     return float(f"{value:.{digits}g}")
 
 
-def _figures(row: Row, *, several: bool) -> list[str]:
+def _figures(row: Row, *, searched: bool) -> list[str]:
     clipped = max(one.clipped for one in row.cells[0] if one is not None)
+    ends = [_percent(one) for one in (row.searches[0], row.searches[-1])]
     return [
-        with_spread(row.rms(), math.nan),
-        *([with_spread(row.spread(), math.nan)] if several else []),
+        _percent(row.relative()),
+        *([" to ".join(ends) if len(row.searches) > 1 else "-"] if searched else []),
         _plain(1e3 * row.effort, "{:.3g}"),
         "-" if row.chatter is None else _plain(1e3 * row.chatter, "{:.3g}"),
         f"{100.0 * clipped:.3g}",
@@ -131,6 +133,13 @@ def _figures(row: Row, *, several: bool) -> list[str]:
         _plain(None if row.gain_margin is None else decibels(row.gain_margin), "{:.1f}"),
         f"{1e9 * row.step_time:.0f}",
     ]
+
+
+def _percent(share: float) -> str:
+    """Write a share in %, of three digits."""
+    if not math.isfinite(share):
+        return "unstable" if share > 0.0 else "-"
+    return f"{100.0 * share:.3g}" if share < 10.0 else f"{100.0 * share:.0f}"
 
 
 def _plain(value: float | None, form: str) -> str:
