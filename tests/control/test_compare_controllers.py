@@ -243,7 +243,7 @@ def test_errors_are_relative_to_the_inverse_alone_and_no_motion_decides_alone() 
     assert len(pid.searches) == 2
     assert pid.searches[0] == pytest.approx(pid.relative())
     assert pid.searches[0] <= pid.searches[1]
-    assert inverse.searches == (pytest.approx(1.0),)
+    assert list(inverse.searches) == pytest.approx([1.0])
     assert found.document()["controllers"][1]["relative_error"][0] == pid.relative()
     # Tuned by the rms over both, the smaller motion has less of a say.
     by_rms = pt.tune(

@@ -259,6 +259,7 @@ fn a_search_beats_the_published_gains_and_keeps_its_margins() {
         stages: 1,
         required: required(),
         aim: Aim::Rms,
+        tolerances: Vec::new(),
         effort: 0.0,
         particles: 24,
         iterations: 40,
