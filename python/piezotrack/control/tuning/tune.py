@@ -229,6 +229,8 @@ def _minimised(problem: TuningProblem) -> str:
     if not problem.references:
         return "integral gain from margins alone"
     words = MINIMISED[problem.goal.minimise]
+    if problem.goal.tolerances and problem.goal.minimise == "rms":
+        words += ", each motion in shares of its tolerance"
     return words.replace("error", "contour error") if problem.stage is not None else words
 
 
