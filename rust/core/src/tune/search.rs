@@ -138,12 +138,14 @@ enum Side {
     Fast,
     /// As [`Side::Fast`], at the places given, and without the observer about a law.
     Inside,
+    /// With a repetitive part that is ahead and does most of the work; as [`Side::Slow`] without one.
+    Ahead,
 }
 
 /// Sides of the searches, and their budgets as multiples of that of the first; those of the second
 /// round are taken where none of the first agree.
 const ROUNDS: [(&[Side], usize); 2] =
-    [(&[Side::Slow, Side::Fast, Side::Inside, Side::Slow], 1), (&[Side::Fast, Side::Slow], 2)];
+    [(&[Side::Slow, Side::Fast, Side::Inside, Side::Ahead], 1), (&[Side::Fast, Side::Ahead], 2)];
 
 /// Searches that end within this share of the best one agree with it.
 const AGREE: f64 = 0.02;
@@ -162,9 +164,12 @@ const ABOUT: f64 = 0.1;
 
 impl Side {
     /// Part of the range in which a setting begins.
-    fn part(self, setting: Setting) -> (f64, f64) {
+    fn part(self, setting: Setting, learns: bool) -> (f64, f64) {
         match (self, setting) {
-            (Self::Slow, Setting::Cutoff) => (0.0, 0.26),
+            (Self::Ahead, Setting::Integral) if learns => (0.0, 0.5),
+            (Self::Ahead, Setting::Learning | Setting::Lead) if learns => (0.5, 1.0),
+            (Self::Ahead, Setting::Cutoff) if learns => (0.26, 1.0),
+            (Self::Slow | Self::Ahead, Setting::Cutoff) => (0.0, 0.26),
             (Self::Fast, Setting::Cutoff) => (0.26, 1.0),
             (Self::Fast | Self::Inside, Setting::Learning) => (0.0, 0.3),
             (Self::Fast | Self::Inside, Setting::Integral) => (0.5, 1.0),
@@ -331,8 +336,9 @@ impl Tuning<'_> {
     /// A search from a side.
     fn run(&self, side: Side, run: u64, times: usize) -> Run {
         let address = (self.seed, run);
-        let sought = self.axes.iter().flat_map(|axis| &axis.sought);
-        let part: Vec<(f64, f64)> = sought.map(|one| side.part(one.setting)).collect();
+        let sought = || self.axes.iter().flat_map(|axis| &axis.sought);
+        let learns = sought().any(|one| one.setting == Setting::Learning);
+        let part: Vec<(f64, f64)> = sought().map(|one| side.part(one.setting, learns)).collect();
         let starts: &[Vec<f64>] = if side == Side::Inside { &self.starts } else { &[] };
         let budget = times * self.particles * self.iterations;
         let evolution = Evolution::new(address, &part, starts, self.particles, budget);
