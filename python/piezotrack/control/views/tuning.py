@@ -52,8 +52,8 @@ def tuned_text(tuned: Tuned) -> str:
         learns = any(one.repetitive is not None for one in tuned.controllers)
         after = "learning" if learns else "settling"
         lines.append(
-            f"{scale * tuned.value:.4g} {unit} after {after}, of the worst stage with the offset of "
-            "the spread"
+            f"{scale * tuned.value:.4g} {unit} after {after}, of the worst stage with the offset "
+            "of the spread"
         )
     word = "contour error " if len(gains) > 1 else ""
     for run in tuned.runs:
