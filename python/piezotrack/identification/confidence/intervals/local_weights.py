@@ -32,8 +32,8 @@ __all__ = ["LocalWeights"]
 # Lists of weights none of which has another sign than the others: that of the gain, or none.
 ABSOLUTE = frozenset(("weights", "masses", "concave_weights", "convex_weights"))
 RELATIVE = frozenset(("stiffness_ratios", "creep_weights"))
-# Values in which the displacement is linear besides, near enough.
-LINEAR = ABSOLUTE | RELATIVE | {"linear", "piezo_coefficient", "dead_zone_weights"}
+# Values in which the displacement is linear besides, where no dead zone bends it.
+LINEAR = ABSOLUTE | RELATIVE | {"linear", "piezo_coefficient"}
 # Values above 0.
 POSITIVE = frozenset(("time_constant", "frequency", "damping_ratio", DELAY))
 # Thresholds by which a change by its size, of a value in which it is not linear, is dearer in a
@@ -45,17 +45,18 @@ LINEARISED = 6
 SENSOR = frozenset(("offset", "drift"))
 DRIFT_TIME = -0.9
 # Most steps to a least cost, and the gain, in thresholds, below which it is reached.
-STEPS, LITTLE = 20, 3e-3
+STEPS, LITTLE = 20, 2e-2
 # Least and most factor from one distance to the next, and one beyond the end; most distances until
 # a profile counts as open.
 NEXT, FURTHER, MOST = (1.1, 3.0), 2.0, 24
 # First distance by which the end is foretold, as a share of the value; factors by which it
 # changes, and most changes.
 FIRST, FACTORS, FORETOLD = 0.1, (0.05, 20.0), 8
-# Share of the threshold within which an end is found, and most descents that refine it.
-NEAR, REFINED = 0.01, 8
+# Share of the threshold within which an end is found, share of a bracket at whose ends nothing is
+# tried, and most descents that refine it.
+NEAR, EDGE, REFINED = 0.02, 0.2, 12
 # Least gain of a minimum beside the fit, in thresholds, and times that one is followed.
-LOWER, FOLLOWED = 0.01, 4
+LOWER, FOLLOWED = 0.05, 4
 
 
 class _Point(NamedTuple):
@@ -103,7 +104,8 @@ class LocalWeights:
         self.fitted = np.array([one.of(fit) for one in self.values])
         self.sizes = sizes_of(fit, self.values, data[0].dt)
         self.low, self.high = self._bounds()
-        self.bent = np.array([value.parameter not in LINEAR for value in self.values])
+        linear = LINEAR if not getattr(fit.model, "dead_zone_weights", ()) else frozenset[str]()
+        self.bent = np.array([value.parameter not in linear for value in self.values])
         self.coordinates = [
             (0, str(value), float(low), float(high))
             for value, low, high in zip(
@@ -343,10 +345,11 @@ class LocalWeights:
             if after is None:
                 return steps[1:], None
             inside, outside = steps[after - 1], steps[after]
+            width = outside.distance - inside.distance
             share = (1.0 - inside.root) / (outside.root - inside.root)
-            end = inside.distance + share * (outside.distance - inside.distance)
+            end = inside.distance + share * width
             near = min(1.0 - inside.root, outside.root - 1.0) < NEAR
-            if near or not descend(end):
+            if near or not descend(inside.distance + min(max(share, EDGE), 1.0 - EDGE) * width):
                 break
         if steps[-1].root < 2.0 and steps[-1].distance < reach:
             descend(min(FURTHER * steps[-1].distance, reach))
