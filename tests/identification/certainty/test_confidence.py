@@ -291,11 +291,11 @@ def of_plays(noise: float, weights: np.ndarray = WEIGHTS) -> pt.Dataset:
     return pt.Dataset(u=NESTED, y=clean + added, dt=DT)
 
 
-def with_thresholds(data: pt.Dataset) -> Identification:
+def with_thresholds(data: pt.Dataset, *, offset: bool = True) -> Identification:
     method = pt.LeastSquares(
         thresholds=THRESHOLDS.tolist(), dynamics=None, dead_zones=0, creep=False
     )
-    return pt.identify(data, "prandtl-ishlinskii", history="virgin", method=method)
+    return pt.identify(data, "prandtl-ishlinskii", history="virgin", method=method, offset=offset)
 
 
 def play(threshold: float) -> np.ndarray:
@@ -350,6 +350,10 @@ def test_profiles_refits_and_covariance_of_plays_agree_away_from_0() -> None:
         of_covariance = 2.0 * 1.959964 * fit.covariance.deviation(name)
         assert width == pytest.approx(of_covariance, rel=0.02)
         assert widths(refits)[name] == pytest.approx(width, rel=0.2)
+    # A record that has nothing of its own determines the gain better.
+    known = with_thresholds(of_plays(20e-9), offset=False).confidence()
+    free = with_thresholds(of_plays(20e-9)).confidence()
+    assert widths(known)["linear"] < widths(free)["linear"]
     at_zero = with_thresholds(of_plays(20e-9)).confidence(method="bootstrap")
     assert float(at_zero.parameters["weights[1]"].values.min()) == 0.0
 

@@ -120,7 +120,8 @@ class LocalWeights:
         self.alone = [(r, name) for r, columns in enumerate(self.own) for name in columns]
         self.sizes_alone = np.array([self._size_alone(r, name) for r, name in self.alone])
         self.orthogonal, self.triangle = self._linearised(fit)
-        self.bent = np.append(self.bent, [name not in SENSOR for _, name in self.alone])
+        bent = np.array([name not in SENSOR for _, name in self.alone], dtype=bool)
+        self.bent = np.concatenate([self.bent, bent])
         shortest = [DRIFT_TIME if name == "drift_time" else -np.inf for _, name in self.alone]
         self.low = np.append(self.low, shortest)
         self.high = np.append(self.high, np.full(len(self.alone), np.inf))
