@@ -281,7 +281,7 @@ def test_an_integrator_is_tuned_as_one_and_the_true_error_is_beside_the_measured
 def test_an_integral_time_below_the_interval_is_replaced(
     ratio: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What the search gives is changed so that the integral time is a part of the interval."""
+    """Gains of a search are changed to an integral time of a part of the interval."""
     search_for = SearchedSet.search
 
     def below(self: Any, *arguments: Any, **options: Any) -> dict[str, Any]:

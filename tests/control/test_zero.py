@@ -110,7 +110,7 @@ def test_a_motion_refused_for_the_zeros_names_both() -> None:
 
 
 def test_a_model_with_an_offset_is_within_its_own_reach_on_a_device() -> None:
-    """What is checked before a loop begins has the offset of the feedforward."""
+    """Checks before a loop begins know the offset of the feedforward."""
     there = device(-112e-6)
     slow = replace(controller(offset=-112e-6, feedback=pt.Pid.from_um(kp=0.02, ti=0.06)), dt=0.05)
     run = pt.track(there, slow, "sine:1Hz,-102..-52um,1s", unstable=True)

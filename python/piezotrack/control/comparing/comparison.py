@@ -13,7 +13,7 @@ from ..._support.units import decibels
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
     from pathlib import Path
 
     from ..controller.controller import Controller
@@ -61,7 +61,9 @@ class Cell(NamedTuple):
     @property
     def spread(self) -> float:
         """Sample standard deviation of the draws [m]; NaN of one, or where the loop diverged."""
-        return _deviation(self.draws)
+        if len(self.draws) < 2 or not all(map(math.isfinite, self.draws)):
+            return math.nan
+        return stdev(self.draws)
 
 
 class Row(NamedTuple):
@@ -125,23 +127,9 @@ class Row(NamedTuple):
         float
             Root of the mean square over the references [m]; NaN where it follows none.
         """
-        found = self._draws(variant)
-        return fmean(found) if found else math.nan
-
-    def spread(self, variant: int = 0) -> float:
-        """Sample standard deviation of that error over the draws of the noise.
-
-        Parameters
-        ----------
-        variant : int, optional
-            Which stage, a place in `ControllerComparison.variants`.
-
-        Returns
-        -------
-        float
-            Standard deviation [m]; NaN of one draw, or where the loop diverged.
-        """
-        return _deviation(self._draws(variant))
+        found = [one.draws for one in self.cells[variant] if one is not None]
+        draws = [math.sqrt(fmean(one**2 for one in draw)) for draw in zip(*found, strict=True)]
+        return fmean(draws) if draws else math.nan
 
     @property
     def effort(self) -> float:
@@ -156,17 +144,6 @@ class Row(NamedTuple):
 
     def _followed(self) -> list[Cell]:
         return [one for one in self.cells[0] if one is not None]
-
-    def _draws(self, variant: int) -> list[float]:
-        """Root of the mean square over the references, for each draw."""
-        found = [one.draws for one in self.cells[variant] if one is not None]
-        return [math.sqrt(fmean(one**2 for one in draws)) for draws in zip(*found, strict=True)]
-
-
-def _deviation(draws: Sequence[float]) -> float:
-    if len(draws) < 2 or not all(map(math.isfinite, draws)):
-        return math.nan
-    return stdev(draws)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -119,15 +119,7 @@ class SearchedSet:
 
     def cost(self, settings: Sequence[Any]) -> tuple[float, float]:
         """Evaluate settings on the stages that are simulated: excess without margins, and cost."""
-        tasks = [one for i in self.stages for one in self._tasks[i]]
-        return _core.tuning_costs(
-            self._problem,
-            margins=NO_MARGINS,
-            axes=self._sought,
-            tasks=tasks,
-            stages=len(self.stages) if tasks else 1,
-            places=[self.place(settings)],
-        )[0]
+        return self._cost(settings, self.stages)
 
     def place(self, settings: Sequence[Any]) -> list[float]:
         """Place of the settings of all axes in the unit box."""
@@ -151,24 +143,24 @@ class SearchedSet:
         """Follow on all stages: the worst cost, and whether a stage was added for it."""
         if len(self.stages) == len(self._tasks):
             return cost, False
-        place = self.place(settings)
-        figures = [
-            _core.tuning_costs(
-                self._problem,
-                margins=NO_MARGINS,
-                axes=self._sought,
-                tasks=tasks,
-                stages=1,
-                places=[place],
-            )[0]
-            for tasks in self._tasks
-        ]
-        excess, costs = np.array(figures).T
+        excess, costs = np.array([self._cost(settings, [i]) for i in range(len(self._tasks))]).T
         worst = int(np.argmax(np.where(excess > 1.0, np.inf, costs)))
         if worst in self.stages or (excess[worst] <= 1.0 and costs[worst] <= WORSE * cost):
             return float(costs.max()), False
         self.stages.append(worst)
         return float(costs.max()), True
+
+    def _cost(self, settings: Sequence[Any], stages: Sequence[int]) -> tuple[float, float]:
+        """Evaluate settings on some stages."""
+        tasks = [one for i in stages for one in self._tasks[i]]
+        return _core.tuning_costs(
+            self._problem,
+            margins=NO_MARGINS,
+            axes=self._sought,
+            tasks=tasks,
+            stages=len(stages) if tasks else 1,
+            places=[self.place(settings)],
+        )[0]
 
     def _limited(self) -> list[_core.SoughtController]:
         return [axis.sought(some) for axis, some in zip(self.axes, self.plants, strict=True)]
