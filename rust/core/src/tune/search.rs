@@ -140,12 +140,17 @@ enum Side {
     Inside,
     /// With a repetitive part that is ahead and does most of the work; as [`Side::Slow`] without one.
     Ahead,
+    /// With the best of the searches before, and anywhere.
+    Joint,
 }
 
 /// Sides of the searches, and their budgets as multiples of that of the first; those of the second
 /// round are taken where none of the first agree.
-const ROUNDS: [(&[Side], usize); 2] =
-    [(&[Side::Slow, Side::Fast, Side::Inside, Side::Ahead], 1), (&[Side::Fast, Side::Ahead], 2)];
+const ROUNDS: [(&[Side], usize); 3] = [
+    (&[Side::Slow, Side::Fast, Side::Inside, Side::Ahead], 1),
+    (&[Side::Fast, Side::Ahead], 2),
+    (&[Side::Joint], 1),
+];
 
 /// Searches that end within this share of the best one agree with it.
 const AGREE: f64 = 0.02;
@@ -267,11 +272,18 @@ impl Tuning<'_> {
         let mut counts = (0, 0);
         let mut history = Vec::new();
         for (sides, times) in ROUNDS {
-            if agreeing(&runs) > 1 || stop() {
+            if stop() {
                 break;
             }
+            if sides != [Side::Joint] && agreeing(&runs) > 1 {
+                continue;
+            }
+            let found: Vec<Vec<f64>> =
+                runs.iter().filter_map(|run| Some(run.best.as_ref()?.0.clone())).collect();
             let numbered = sides.iter().zip(runs.len() as u64..);
-            runs.extend(numbered.map(|(side, run)| self.run(*side, run, times)));
+            let begun: Vec<Run> =
+                numbered.map(|(side, run)| self.run(*side, run, times, &found)).collect();
+            runs.extend(begun);
             loop {
                 let pending: Vec<Vec<Vec<f64>>> = runs.iter().map(Run::pending).collect();
                 let places: Vec<&Vec<f64>> = pending.iter().flatten().collect();
@@ -334,12 +346,16 @@ impl Tuning<'_> {
     }
 
     /// A search from a side.
-    fn run(&self, side: Side, run: u64, times: usize) -> Run {
+    fn run(&self, side: Side, run: u64, times: usize, found: &[Vec<f64>]) -> Run {
         let address = (self.seed, run);
         let sought = || self.axes.iter().flat_map(|axis| &axis.sought);
         let learns = sought().any(|one| one.setting == Setting::Learning);
         let part: Vec<(f64, f64)> = sought().map(|one| side.part(one.setting, learns)).collect();
-        let starts: &[Vec<f64>] = if side == Side::Inside { &self.starts } else { &[] };
+        let starts: &[Vec<f64>] = match side {
+            Side::Inside => &self.starts,
+            Side::Joint => found,
+            _ => &[],
+        };
         let budget = times * self.particles * self.iterations;
         let evolution = Evolution::new(address, &part, starts, self.particles, budget);
         Run { address, phase: Phase::Evolving(evolution), refined: budget, best: None }
