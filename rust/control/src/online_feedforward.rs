@@ -196,8 +196,8 @@ impl<I: Inverse> OnlineFeedforward<I> {
     /// Reports the drive that reached the stage in place of the last one: the inverse remembers
     /// it instead. [`crate::Controller::reached`] knows it.
     ///
-    /// The last step is done again for the displacement at which the inverse gives this drive. It
-    /// takes some hundred times as long as a step. Without a last drive, and where no displacement
+    /// The last step is done again for the displacement at which the inverse gives this drive: the
+    /// inverse is evaluated 81 times at most, some 20 times mostly. Without a last drive, and where no displacement
     /// has this one, nothing changes.
     pub fn applied(&self, state: &mut OnlineFeedforwardState<I::State>, volts: f64) {
         let Some(target) = state.target else { return };

@@ -59,6 +59,7 @@ def dahl_inverse(
         Constant("INVERSE_FRICTION", friction, f"b0/T, {unit} for one unit of the slope"),
         Constant("INVERSE_PIECE", longest, "longest way in one piece, m"),
         Constant("INVERSE_LONGEST", min(MOST_PIECES * longest, largest), "longest way, m"),
+        Constant("DRIVE_SAME", 2.0**-21 if single else 2.0**-50, "difference that counts as none"),
         Constant("REFERENCE_DT", dt, "Ts, s"),
         Constant("REFERENCE_DT_SQUARED", dt * dt, "Ts^2, s^2"),
         Constant("REFERENCE_OFFSET", offset, "reading of the sensor at rest, m"),
@@ -252,53 +253,73 @@ static real inverse_excess(const NAME_state *s, real x, real volts, NAME_inverse
 }
 
 /* Remembers the voltage that the stage got in place of the last one: finds the displacement for
-   which the inverse gives it, by bisection. Some hundred times as long as a step. */
+   which the inverse gives it, by false position with the weights of the Illinois rule (Dowell and
+   Jarratt 1971). The inverse is evaluated 81 times at most, some 20 times mostly. */
 static void inverse_remember(NAME_state *s, real volts)
 {
     NAME_inverse after;
     NAME_inverse kept;
-    real outside, inside, step, excess;
+    real outside, inside, far, near, step, same;
     int above, side;
     int found = 0;
+    int last = -1;
     int i;
     if (!s->has_target) {
         return;
     }
     outside = s->target[0];
     inside = outside;
-    above = inverse_excess(s, outside, volts, &kept) > 0;
+    far = inverse_excess(s, outside, volts, &kept);
+    near = far;
+    same = DRIVE_SAME * (magnitude(far + volts) + magnitude(volts));
+    above = far > 0;
     step = FIRST_STEP;
-    for (i = 0; i < 50 && !found; i++) {
+    for (i = 0; i < 20 && !found; i++) {
         for (side = 0; side < 2 && !found; side++) {
             const real place = side == 0 ? s->target[0] - step : s->target[0] + step;
-            excess = inverse_excess(s, place, volts, &after);
+            const real excess = inverse_excess(s, place, volts, &after);
             if (is_finite(excess) && (excess > 0) != above) {
                 inside = place;
+                near = excess;
                 kept = after;
                 found = 1;
             }
         }
-        step += step;
+        step *= 4;
     }
     if (!found) {
         return;
     }
-    for (i = 0; i < 80; i++) {
-        const real middle = (real)0.5 * (outside + inside);
-        excess = inverse_excess(s, middle, volts, &after);
-        if ((excess > 0) == above || excess != excess) {
-            outside = middle;
-        } else {
-            inside = middle;
+    found = magnitude(near) <= same;
+    for (i = 0; i < 40 && !found; i++) {
+        const real crossing = outside - far * (inside - outside) / (near - far);
+        const int lies = (crossing > outside && crossing < inside)
+            || (crossing < outside && crossing > inside);
+        const real place = lies ? crossing : (real)0.5 * (outside + inside);
+        const real excess = inverse_excess(s, place, volts, &after);
+        const int beyond = (excess > 0) == above || excess != excess;
+        if (magnitude(excess) <= same) {
             kept = after;
+            found = 1;
+        } else if (beyond) {
+            outside = place;
+            far = excess;
+            if (last == 1) {
+                near *= (real)0.5;
+            }
+        } else {
+            inside = place;
+            near = excess;
+            kept = after;
+            if (last == 0) {
+                far *= (real)0.5;
+            }
         }
-        if (magnitude(excess) <= 0) {
-            break;
-        }
+        last = beyond;
     }
     s->inverse = kept;
 }
-""".replace("FIRST_STEP", "(real)1e-12")
+""".replace("FIRST_STEP", "(real)1e-11")
 
 ONLINE_CODE = """\
 

@@ -11,6 +11,7 @@ mod requirements;
 mod run_metrics;
 mod search;
 mod settings;
+mod sides;
 
 pub use contour::{Outline, PathTask, ReadyPath};
 pub use judge::Judge;

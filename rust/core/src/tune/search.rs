@@ -2,18 +2,17 @@
 //!
 //! Several searches, each from another side, look for the settings with the least figure over all
 //! tasks among those that keep what is required; where none does, for those nearest to it. Where
-//! none agrees with the best, there are more of them. Loops are only simulated for controllers that
-//! keep the margins.
+//! none agrees with the best, there are more of them. The last search begins with the best of all.
+//! Loops are only simulated for controllers that keep the margins.
 
 use piezotrack_control::Controller;
 use rayon::prelude::*;
 
-use super::adaptation::Adaptation;
-use super::evolution::Evolution;
 use super::judge::{Judge, Ready};
 use super::requirements::{PlantSet, Requirements, Robustness};
 use super::run_metrics::RunMetrics;
 use super::settings::{Setting, Sought, Template};
+use super::sides::{ROUNDS, Run, Side, Tried, agreeing};
 use crate::error::{Error, Result, not_negative, positive};
 use crate::parts::Law;
 use crate::signal::{Stop, index};
@@ -99,164 +98,17 @@ pub struct Found {
     pub loops: usize,
     /// Best figure after each iteration; infinite as long as none keeps what is required.
     pub history: Vec<f64>,
-    /// Searches from different sides.
+    /// Independent searches, from different sides; a last one begins with the best of them all.
     pub searches: usize,
     /// How many of them end within 2 % of the best.
     pub agreeing: usize,
 }
-
-/// A candidate and what was found of it.
-#[derive(Clone, Debug)]
-struct Tried {
-    settings: Vec<Settings>,
-    controllers: Option<Vec<Controller<Law>>>,
-    robustness: Option<Robustness>,
-    figures: Vec<RunMetrics>,
-    excess: f64,
-    cost: f64,
-}
-
-impl Tried {
-    /// Rank that a search makes small: any that keeps what is required comes before any that does
-    /// not, and one that keeps the margins before one that does not.
-    fn rank(&self) -> f64 {
-        let rank = match (self.excess <= 1.0, self.figures.is_empty()) {
-            (true, _) => self.cost,
-            (false, false) => 1e6 * self.excess,
-            (false, true) => 1e12 * self.excess,
-        };
-        if rank.is_nan() { f64::INFINITY } else { rank }
-    }
-}
-
-/// Where a search begins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    /// With a low-pass slower than the loop, which with the derivative is another structure.
-    Slow,
-    /// With a faster low-pass and a feedback that does most of the work.
-    Fast,
-    /// As [`Side::Fast`], at the places given, and without the observer about a law.
-    Inside,
-    /// With a repetitive part that is ahead and does most of the work; as [`Side::Slow`] without one.
-    Ahead,
-    /// With the best of the searches before, and anywhere.
-    Joint,
-}
-
-/// Sides of the searches, and their budgets as multiples of that of the first; those of the second
-/// round are taken where none of the first agree.
-const ROUNDS: [(&[Side], usize); 3] = [
-    (&[Side::Slow, Side::Fast, Side::Inside, Side::Ahead], 1),
-    (&[Side::Fast, Side::Ahead], 2),
-    (&[Side::Joint], 1),
-];
-
-/// Searches that end within this share of the best one agree with it.
-const AGREE: f64 = 0.02;
 
 /// Fewest candidates that a search begins with: a trial is made of four.
 const LEAST_PARTICLES: usize = 4;
 
 /// Most candidates of a search.
 const MOST_CANDIDATES: usize = 1_000_000_000;
-
-/// A refinement that after so many candidates is so much worse than the best search ends.
-const BEHIND: (usize, f64) = (800, 1.5);
-
-/// First step of a refinement, as a share of the box.
-const ABOUT: f64 = 0.1;
-
-impl Side {
-    /// Part of the range in which a setting begins.
-    fn part(self, setting: Setting, learns: bool) -> (f64, f64) {
-        match (self, setting) {
-            (Self::Ahead, Setting::Integral) if learns => (0.0, 0.5),
-            (Self::Ahead, Setting::Learning | Setting::Lead) if learns => (0.5, 1.0),
-            (Self::Ahead, Setting::Cutoff) if learns => (0.26, 1.0),
-            (Self::Slow | Self::Ahead, Setting::Cutoff) => (0.0, 0.26),
-            (Self::Fast, Setting::Cutoff) => (0.26, 1.0),
-            (Self::Fast | Self::Inside, Setting::Learning) => (0.0, 0.3),
-            (Self::Fast | Self::Inside, Setting::Integral) => (0.5, 1.0),
-            // It does not evolve from there; its refinement has it.
-            (Self::Inside, Setting::Observer) => (0.0, 0.0),
-            _ => (0.0, 1.0),
-        }
-    }
-}
-
-/// Phase of a search.
-enum Phase {
-    Evolving(Evolution),
-    Refining(Adaptation),
-    Ended,
-}
-
-/// One search.
-struct Run {
-    address: (u64, u64),
-    phase: Phase,
-    refined: usize,
-    best: Option<(Vec<f64>, Tried)>,
-}
-
-impl Run {
-    fn pending(&self) -> Vec<Vec<f64>> {
-        match &self.phase {
-            Phase::Evolving(one) => one.pending().cloned().collect(),
-            Phase::Refining(one) => one.pending().cloned().collect(),
-            Phase::Ended => Vec::new(),
-        }
-    }
-
-    fn tell(&mut self, places: &[Vec<f64>], tried: &[Tried]) {
-        let ranks: Vec<f64> = tried.iter().map(Tried::rank).collect();
-        for (place, one) in places.iter().zip(tried) {
-            if self.best.as_ref().is_none_or(|(_, best)| one.rank() < best.rank()) {
-                self.best = Some((place.clone(), one.clone()));
-            }
-        }
-        match &mut self.phase {
-            Phase::Evolving(one) => one.tell(&ranks),
-            Phase::Refining(one) => one.tell(&ranks),
-            Phase::Ended => {}
-        }
-        let ended = match &self.phase {
-            Phase::Evolving(one) => one.ended(),
-            Phase::Refining(one) => one.ended(),
-            Phase::Ended => false,
-        };
-        if ended {
-            self.phase = match (&self.phase, &self.best) {
-                (Phase::Evolving(_), Some((place, _))) => {
-                    Phase::Refining(Adaptation::new(self.address, place, ABOUT, self.refined))
-                }
-                _ => Phase::Ended,
-            };
-        }
-    }
-
-    /// Ends where it is far behind the best of all searches.
-    fn give_up(&mut self, best: f64) {
-        let (candidates, factor) = BEHIND;
-        if let Phase::Refining(one) = &self.phase
-            && one.evaluated() >= candidates
-            && self.rank() > factor * best
-        {
-            self.phase = Phase::Ended;
-        }
-    }
-
-    fn rank(&self) -> f64 {
-        self.best.as_ref().map_or(f64::INFINITY, |(_, one)| one.rank())
-    }
-}
-
-/// How many of some searches end within 2 % of the best.
-fn agreeing(runs: &[Run]) -> usize {
-    let best = runs.iter().map(Run::rank).fold(f64::INFINITY, f64::min);
-    runs.iter().filter(|run| run.rank() <= best * (1.0 + AGREE)).count()
-}
 
 impl Tuning<'_> {
     /// Searches; the result has the same bits whatever the threads. Where `stop` said so, the best
@@ -275,14 +127,10 @@ impl Tuning<'_> {
             if stop() {
                 break;
             }
-            if sides != [Side::Joint] && agreeing(&runs) > 1 {
+            if sides != [Side::Joint] && agreeing(&runs).1 > 1 {
                 continue;
             }
-            let found: Vec<Vec<f64>> =
-                runs.iter().filter_map(|run| Some(run.best.as_ref()?.0.clone())).collect();
-            let numbered = sides.iter().zip(runs.len() as u64..);
-            let begun: Vec<Run> =
-                numbered.map(|(side, run)| self.run(*side, run, times, &found)).collect();
+            let begun = self.begin(sides, times, &runs);
             runs.extend(begun);
             loop {
                 let pending: Vec<Vec<Vec<f64>>> = runs.iter().map(Run::pending).collect();
@@ -309,7 +157,7 @@ impl Tuning<'_> {
                 history.push(kept.map(|(_, best)| best.cost).fold(f64::INFINITY, f64::min));
             }
         }
-        let (searches, agreeing) = (runs.len(), agreeing(&runs));
+        let (searches, agreeing) = agreeing(&runs);
         let best = runs.into_iter().filter_map(|run| run.best);
         let best = best.min_by(|(_, a), (_, b)| a.rank().total_cmp(&b.rank()));
         let none = || Error::Numerical("no controller could be built from the settings".into());
@@ -345,20 +193,21 @@ impl Tuning<'_> {
         Ok(tried.iter().map(|one| (one.excess, cost(one))).collect())
     }
 
-    /// A search from a side.
-    fn run(&self, side: Side, run: u64, times: usize, found: &[Vec<f64>]) -> Run {
-        let address = (self.seed, run);
-        let sought = || self.axes.iter().flat_map(|axis| &axis.sought);
-        let learns = sought().any(|one| one.setting == Setting::Learning);
-        let part: Vec<(f64, f64)> = sought().map(|one| side.part(one.setting, learns)).collect();
-        let starts: &[Vec<f64>] = match side {
-            Side::Inside => &self.starts,
-            Side::Joint => found,
-            _ => &[],
+    /// Searches of a round, after those of the rounds before.
+    fn begin(&self, sides: &[Side], times: usize, before: &[Run]) -> Vec<Run> {
+        let sought = self.axes.iter().flat_map(|axis| &axis.sought);
+        let settings: Vec<Setting> = sought.map(|one| one.setting).collect();
+        let sizes = (self.particles, times * self.particles * self.iterations);
+        let found = || before.iter().filter_map(|run| Some(run.best.as_ref()?.0.clone()));
+        let begin = |(side, run): (&Side, u64)| {
+            let starts = match side {
+                Side::Inside => self.starts.clone(),
+                Side::Joint => found().collect(),
+                Side::Slow | Side::Fast | Side::Ahead => Vec::new(),
+            };
+            Run::new(*side, (self.seed, run), &settings, &starts, sizes)
         };
-        let budget = times * self.particles * self.iterations;
-        let evolution = Evolution::new(address, &part, starts, self.particles, budget);
-        Run { address, phase: Phase::Evolving(evolution), refined: budget, best: None }
+        sides.iter().zip(before.len() as u64..).map(begin).collect()
     }
 
     fn validate(&self) -> Result<()> {
