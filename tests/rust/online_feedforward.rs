@@ -4,6 +4,7 @@
 use core::f64::consts::{PI, TAU};
 
 use piezotrack_control::hysteresis::{Operator, Play};
+use piezotrack_control::inverse::after_drive;
 use piezotrack_control::{
     BoucWenInverse, Creep, DahlInverse, Dynamics, FirstOrderDahlInverse, InputInverse, Inverse,
     OnlineFeedforward, OperatorInverse, OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse,
@@ -417,4 +418,76 @@ fn stages_without_an_inverse_are_refused() {
     assert_eq!(refused(PLAY, &[Creep { share: 0.1, time: 0.0 }], none, 1e-3), "creep_times");
     assert_eq!(refused(PLAY, &[], Dynamics::First { time: -PI }, 1e-3), "time_constant");
     assert_eq!(refused(Play { linear: 0.0, ..PLAY }, &[], none, 1e-3), "linear");
+}
+
+/// Counts how often an inverse is evaluated.
+struct Counted<I>(I, core::cell::Cell<u32>);
+
+impl<I: Inverse> Inverse for Counted<I> {
+    type State = I::State;
+
+    fn rest(&self) -> I::State {
+        self.0.rest()
+    }
+
+    fn step(&self, state: &mut I::State, x: f64, v: f64, a: f64) -> f64 {
+        self.1.set(self.1.get() + 1);
+        self.0.step(state, x, v, a)
+    }
+}
+
+/// Where the stage got another drive, the inverse is there for which it is the right one; it is found
+/// in a number of evaluations that firmware can rely on.
+#[test]
+fn the_displacement_of_a_clipped_drive_takes_few_evaluations() {
+    let dt = 0.02;
+    let inverse = Counted(DahlInverse::xu_li_2010().at(dt).unwrap(), core::cell::Cell::new(0));
+    let (mut before, mut sum, mut most, mut clipped) = (inverse.rest(), 0, 0, 0);
+    for k in 0..600 {
+        let [x, v, a] = sine(0.037 * f64::from(k));
+        let (x, v, a) = (x + AMPLITUDE, 0.1 * v, 0.01 * a);
+        let mut state = before;
+        let asked = inverse.step(&mut state, x, v, a);
+        let reached = asked.clamp(8.0, 50.0);
+        if asked.to_bits() == reached.to_bits() {
+            before = state;
+            continue;
+        }
+        inverse.1.set(0);
+        let after = after_drive(&inverse, &before, [x, v, a], reached).unwrap();
+        sum += inverse.1.get();
+        most = most.max(inverse.1.get());
+        clipped += 1;
+        // The hysteresis that it remembers gives that drive: a step back to the same displacement.
+        let mut again = before;
+        let place = found_by_bisection(&inverse, &before, [x, v, a], reached);
+        inverse.step(&mut again, place, v, a);
+        let next = |mut from| inverse.step(&mut from, x, v, a);
+        let difference = (next(after) - next(again)).abs();
+        assert!(difference < 1e-9, "{k}: {difference:e} V");
+        before = after;
+    }
+    assert!(clipped > 100, "{clipped}");
+    assert!(most <= 81, "{most}");
+    assert!(sum < 40 * clipped, "{sum} for {clipped}");
+}
+
+/// The displacement of a drive, by plain bisection over 200 um.
+fn found_by_bisection<I: Inverse>(
+    inverse: &I,
+    before: &I::State,
+    [_, v, a]: [f64; 3],
+    volts: f64,
+) -> f64 {
+    let (mut low, mut high) = (-100e-6, 200e-6);
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        let mut state = *before;
+        if inverse.step(&mut state, middle, v, a) < volts {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    low
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -131,6 +132,9 @@ def c_sources(
     unit = controller.drive_unit
     rows = rows_of(controller, table, reference)
     bound, flags = _bounds(controller, shape.law, len(rows)) if single else (0.0, 0)
+    if single and shape.forward == "online":
+        finite = (abs(row.reference) for row in rows if math.isfinite(row.reference))
+        bound += _bound_of_differences(parts, max(finite))
     texts = {
         f"{name}.h": _header(parts, facts, shape.forward, unit, single=single),
         f"{name}.c": _source(parts, facts, single=single),
@@ -153,6 +157,17 @@ def _bounds(controller: Controller, law: str, steps: int) -> tuple[float, int]:
     low, high = controller.limits
     share = FLOAT_BOUND_OBSERVER if law == "observer" else FLOAT_BOUND
     return share * (high - low) * steps / STEPS, int(FLOAT_FLAGS * steps)
+
+
+def _bound_of_differences(parts: tuple[Part, ...], reach: float) -> float:
+    """Largest effect of a rounded reference on the online inverse, in the unit of the drive."""
+    constants = (one for part in parts for one in part.constants)
+    of = {one.name: one.value for one in constants if isinstance(one.value, float)}
+    rounding = reach * 2.0**-24
+    velocity = 2.0 * rounding / of["REFERENCE_DT"]
+    acceleration = 4.0 * rounding / of["REFERENCE_DT_SQUARED"]
+    drive = of["INVERSE_STIFFNESS"] * rounding + of["INVERSE_DAMPING"] * velocity
+    return drive + of["INVERSE_INERTIA"] * acceleration
 
 
 def _command_bytes(*, single: bool) -> int:
