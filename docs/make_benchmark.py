@@ -1,4 +1,4 @@
-"""Put the tables and the picture of ``piezotrack benchmark`` into docs/benchmark.md.
+"""Put the tables and the picture of ``piezotrack benchmark`` into docs/evidence.md.
 
 Run as ``make benchmark``, or ``python docs/make_benchmark.py FOLDER`` with the folder that the
 command wrote. The words around the tables are written by hand.
@@ -18,7 +18,7 @@ def main() -> None:
     """Replace what stands between the two marks."""
     if len(sys.argv) != 2:
         raise SystemExit("usage: python docs/make_benchmark.py FOLDER")
-    folder, page = Path(sys.argv[1]), DOCS / "benchmark.md"
+    folder, page = Path(sys.argv[1]), DOCS / "evidence.md"
     tables = (folder / "benchmark.md").read_text(encoding="utf-8").strip()
     text = page.read_text(encoding="utf-8")
     head, begin, rest = text.partition(BEGIN)
