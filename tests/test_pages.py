@@ -17,7 +17,7 @@ import pytest
 import piezotrack as pt
 from commands import run
 from folders import ROOT
-from piezotrack.cli.demonstrations.demonstration import demo_logs
+from piezotrack.cli.research.demonstration import demo_logs
 from piezotrack.data.log_file import write_log
 from piezotrack.identification.fit import identify
 from served import serving
