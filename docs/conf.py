@@ -26,7 +26,7 @@ extensions = [
     "mathml",
     "names",
     "offline",
-    "reference",
+    "reference_pages",
 ]
 exclude_patterns = ["_build", "_templates", "extensions"]
 myst_enable_extensions = ["dollarmath"]

@@ -17,7 +17,7 @@ import pytest
 import piezotrack as pt
 from commands import run
 from folders import ROOT
-from piezotrack.cli.demonstrations.demonstration import demo_logs
+from piezotrack.cli.research.demonstration import demo_logs
 from piezotrack.data.log_file import write_log
 from piezotrack.identification.fit import identify
 from served import serving
@@ -50,7 +50,10 @@ TYPED = [page for page in PAGES if any(b.language in ("python", "console") for b
 
 
 # Pages whose blocks compute for seconds.
-LONG = ("first-controller.md", "hardware.md", "paper.md", "tuning.md", "two-axes.md", "learning.md")
+LONG = (
+    *("first-controller.md", "hardware.md", "identification.md", "learning.md", "paper.md"),
+    *("tuning.md", "two-axes.md"),
+)
 MARKED = [
     pytest.param(page, marks=pytest.mark.slow) if page.name in LONG else page for page in TYPED
 ]

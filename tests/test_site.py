@@ -25,7 +25,7 @@ def extension(name: str) -> ModuleType:
 
 
 def test_every_public_name_has_a_place() -> None:
-    reference = extension("reference")
+    reference = extension("reference_pages")
     places = reference.places()
     for room in reference.ROOMS:
         for name in getattr(pt, room).__all__:
@@ -39,7 +39,7 @@ def test_every_public_name_has_a_place() -> None:
 
 
 def test_the_commands_page_has_the_options_of_a_command() -> None:
-    page = extension("reference").pages()["commands"]
+    page = extension("reference_pages").pages()["commands"]
     identify = page.partition("\n## identify\n")[2].partition("\n## ")[0]
     assert "--window" in identify
     assert "--model" in identify

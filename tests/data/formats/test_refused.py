@@ -1,4 +1,4 @@
-"""Bad logs of every format: each is refused in one sentence, with its file and what was expected."""
+"""Bad logs of every format: each is refused with its file and what was expected."""
 
 from __future__ import annotations
 

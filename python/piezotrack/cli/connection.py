@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ...errors import Interrupted, PiezotrackError
-from ..interruption import acknowledge_interrupt
+from ..errors import Interrupted, PiezotrackError
+from .interruption import acknowledge_interrupt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from ...errors import DataError, DeviceError
-    from ...hardware.device import Device
+    from ..errors import DataError, DeviceError
+    from ..hardware.device import Device
 
 __all__ = ["DeviceAddress", "Rest", "connected", "with_what_is_kept"]
 
@@ -59,7 +59,7 @@ def with_what_is_kept(
 @contextmanager
 def connected(address: str) -> Iterator[Device]:
     """Connect to a device, and give the connection back at the end."""
-    from ...hardware.addresses import connect
+    from ..hardware.addresses import connect
 
     device = connect(address)
     try:

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from ...errors import ParameterError
+from ..connection import DeviceAddress, Rest, connected
 from ..error_messages import report_errors
 from ..options import Duration, Overwrite, Quiet, list_files
-from .connection import DeviceAddress, Rest, connected
 
 __all__ = ["measure_command"]
 

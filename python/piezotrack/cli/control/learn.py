@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from ...errors import DataError, DeviceError, Interrupted, ParameterError
-from ..devices.connection import Rest, connected, with_what_is_kept
+from ..connection import Rest, connected, with_what_is_kept
 from ..error_messages import report_errors
 from ..options import (
     Duration,

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ...errors import ParameterError
+from ..connection import connected
 from ..error_messages import report_errors
 from ..options import number_range, refuse_without_effect
-from .connection import connected
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ...errors import DeviceError, Interrupted, ParameterError
-from ..devices.connection import connected, with_what_is_kept
+from ..connection import connected, with_what_is_kept
 from ..error_messages import report_errors
 from ..options import (
     Duration,

@@ -9,10 +9,7 @@ from typing import Annotated
 import typer
 
 from ...errors import ParameterError
-from ..error_messages import report_errors
-from ..options import Json, ModelFile, Out, Overwrite, Quiet
-from ..output import Output
-from .loop_options import (
+from ..control.loop_options import (
     PAPER,
     AmplifierBandwidth,
     Interval,
@@ -26,6 +23,9 @@ from .loop_options import (
     refuse_of_other_stage,
     simulated,
 )
+from ..error_messages import report_errors
+from ..options import Json, ModelFile, Out, Overwrite, Quiet
+from ..output import Output
 
 __all__ = ["compare_controllers_command"]
 

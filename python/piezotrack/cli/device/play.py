@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..devices.connection import DeviceAddress, Rest, connected
+from ..connection import DeviceAddress, Rest, connected
+from ..control.loop_options import known_model
 from ..error_messages import report_errors
 from ..options import (
     Duration,
@@ -19,7 +20,6 @@ from ..options import (
     Zero,
 )
 from ..output import Output
-from .loop_options import known_model
 
 if TYPE_CHECKING:
     from ...control.controller.controller import Controller
