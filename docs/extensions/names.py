@@ -1,4 +1,7 @@
-"""Links to the reference from names in docstrings and pages: `Dataset.cut`, ``pt.identify``."""
+"""Links: to the reference from names as `Dataset.cut` and ``pt.identify``, to files beside docs.
+
+Markdown outside of the site, as ../benches/README.md, is a file to download.
+"""
 
 from __future__ import annotations
 
@@ -65,8 +68,15 @@ def resolve(
     )
 
 
+def outside(_: Sphinx, docname: str, source: list[str]) -> None:
+    """Name a Markdown file outside of the site as a file."""
+    if "/" not in docname:
+        source[0] = re.sub(r"\]\((\.\./[^)#\s]+\.md)(#[^)\s]*)?\)", r"](path:\1)", source[0])
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Connect both."""
+    """Connect all three."""
     app.add_transform(CodeToReference)
+    app.connect("source-read", outside)
     app.connect("missing-reference", resolve)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

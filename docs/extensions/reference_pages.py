@@ -37,7 +37,7 @@ def places() -> dict[str, str]:
     """Return the page of each public name, by its full name as a user writes it."""
     import piezotrack as pt
 
-    top = set(pt.__all__)
+    top = set(vars(pt)["__all__"])
     found = {}
     for room in ROOMS:
         module = getattr(pt, room)
