@@ -1,6 +1,6 @@
 """Tuned gains beside the published ones of Xu and Li 2010, along the sine of Fig. 12 at 50 Hz.
 
-Run as ``python tune_gains.py [OUT]``. Writes the picture of docs/tuning.md, tuning.png: the error
+Run as ``python tune_gains.py [OUT]``. Writes the picture of docs/control.md, tuning.png: the error
 over time, and the margins that both keep at the highest gain of the stage.
 """
 
