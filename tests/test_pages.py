@@ -50,8 +50,8 @@ TYPED = [page for page in PAGES if any(b.language in ("python", "console") for b
 
 # Pages whose blocks compute for seconds.
 LONG = (
-    *("control.md", "first-controller.md", "hardware.md", "identification.md", "learning.md"),
-    *("paper.md", "two-axes.md"),
+    *("control.md", "evidence.md", "first-controller.md", "hardware.md", "identification.md", "learning.md"),
+    "two-axes.md",
 )
 MARKED = [
     pytest.param(page, marks=pytest.mark.slow) if page.name in LONG else page for page in TYPED
