@@ -50,12 +50,9 @@ TYPED = [page for page in PAGES if any(b.language in ("python", "console") for b
 
 
 # Pages whose blocks compute for seconds.
-LONG = (
-    *("control.md", "evidence.md", "first-controller.md", "hardware.md", "identification.md", "learning.md"),
-    "two-axes.md",
-)
+LONG = "control evidence first-controller hardware identification learning two-axes".split()
 MARKED = [
-    pytest.param(page, marks=pytest.mark.slow) if page.name in LONG else page for page in TYPED
+    pytest.param(page, marks=pytest.mark.slow) if page.stem in LONG else page for page in TYPED
 ]
 
 
