@@ -50,7 +50,15 @@ TYPED = [page for page in PAGES if any(b.language in ("python", "console") for b
 
 
 # Pages whose blocks compute for seconds.
-LONG = "control evidence first-controller hardware identification learning two-axes".split()
+LONG = (
+    "control",
+    "evidence",
+    "first-controller",
+    "hardware",
+    "identification",
+    "learning",
+    "two-axes",
+)
 MARKED = [
     pytest.param(page, marks=pytest.mark.slow) if page.stem in LONG else page for page in TYPED
 ]
