@@ -102,7 +102,7 @@ docs: $(VENV)/installed $(VENV)/site-tools ## The site: target/site/index.html; 
 crate-docs: ## The crates' pages: target/doc
 	cargo doc --locked --no-deps
 
-architecture: $(VENV)/installed ## Draw docs/architecture.svg and write the tree of its page, from the code
+architecture: $(VENV)/installed ## Draw docs/architecture.svg from the code
 	$(BIN)/python docs/make_architecture.py
 
 notices: ## Write THIRD-PARTY.txt: the licences of the crates that are linked in

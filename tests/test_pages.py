@@ -51,11 +51,16 @@ TYPED = [page for page in PAGES if any(b.language in ("python", "console") for b
 
 # Pages whose blocks compute for seconds.
 LONG = (
-    *("control.md", "first-controller.md", "hardware.md", "identification.md", "learning.md"),
-    *("paper.md", "two-axes.md"),
+    "control",
+    "evidence",
+    "first-controller",
+    "hardware",
+    "identification",
+    "learning",
+    "two-axes",
 )
 MARKED = [
-    pytest.param(page, marks=pytest.mark.slow) if page.name in LONG else page for page in TYPED
+    pytest.param(page, marks=pytest.mark.slow) if page.stem in LONG else page for page in TYPED
 ]
 
 
