@@ -12,6 +12,8 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS / "extensions"))
 
+from gallery import settings  # noqa: E402
+
 project = "piezotrack"
 author = "The piezotrack developers"
 copyright = author
@@ -23,14 +25,23 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
     "mathml",
     "names",
     "offline",
     "reference_pages",
 ]
-exclude_patterns = ["_build", "_templates", "extensions"]
+exclude_patterns = [
+    "_build",
+    "extensions",
+    "gallery/backreferences",
+    "gallery/*.ipynb",
+    "gallery/*.py",
+]
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
+
+sphinx_gallery_conf = settings()
 
 # Docstrings: a name in single quotes is a link where it is a public one, else code.
 default_role = "py:obj"
@@ -41,7 +52,6 @@ napoleon_google_docstring = False
 napoleon_custom_sections = [("Attributes", "params_style")]
 napoleon_use_rtype = False
 toc_object_entries_show_parents = "hide"
-add_module_names = False
 python_maximum_signature_line_length = 80
 html_math_renderer = "mathml"
 

@@ -2,47 +2,41 @@
 
 from __future__ import annotations
 
-import importlib.util
-from typing import TYPE_CHECKING
+import re
 
+import gallery
+import offline
 import pytest
+import reference_pages
 
 import piezotrack as pt
-from folders import ROOT
-
-if TYPE_CHECKING:
-    from types import ModuleType
-
-
-def extension(name: str) -> ModuleType:
-    pytest.importorskip("sphinx")
-    found = importlib.util.spec_from_file_location(name, ROOT / f"docs/extensions/{name}.py")
-    assert found is not None
-    assert found.loader is not None
-    module = importlib.util.module_from_spec(found)
-    found.loader.exec_module(module)
-    return module
 
 
 def test_every_public_name_has_a_place() -> None:
-    reference = extension("reference_pages")
-    places = reference.places()
-    for room in reference.ROOMS:
+    places = reference_pages.places()
+    for room in reference_pages.ROOMS:
         for name in vars(getattr(pt, room))["__all__"]:
             ends = (f"piezotrack.{name}", f"piezotrack.{room}.{name}")
             # A package within a room, as `datasets`, has a place for each of its names.
             assert any(one in places for one in ends) or any(
                 one.startswith(f"{ends[1]}.") for one in places
             ), name
-    rooms = {*reference.ROOMS, "datasets", "__version__"}
+    rooms = {*reference_pages.ROOMS, "datasets", "__version__"}
     assert {f"piezotrack.{name}" for name in set(vars(pt)["__all__"]) - rooms} <= set(places)
 
 
 def test_the_commands_page_has_the_options_of_a_command() -> None:
-    page = extension("reference_pages").pages()["commands"]
+    page = reference_pages.commands()
     identify = page.partition("\n## identify\n")[2].partition("\n## ")[0]
     assert "--window" in identify
     assert "--model" in identify
+
+
+def test_every_script_of_the_gallery_has_its_place_and_a_picture() -> None:
+    scripts = {path.name: path.read_text("utf-8") for path in gallery.SCRIPTS.glob("*.py")}
+    assert sorted(gallery.ORDER) == sorted(scripts)
+    drawn = re.compile(r"\.plot\w*\(|subplots\(")
+    assert [name for name, text in scripts.items() if not drawn.search(text)] == []
 
 
 @pytest.mark.parametrize(
@@ -59,4 +53,4 @@ def test_the_commands_page_has_the_options_of_a_command() -> None:
     ],
 )
 def test_what_is_loaded_from_a_network_is_found(text: str, found: list[str]) -> None:
-    assert extension("offline").foreign(text) == found
+    assert offline.foreign(text) == found

@@ -33,6 +33,11 @@ class CodeToReference(SphinxTransform):
         for word in list(self.document.findall(addnodes.pending_xref)):
             if word["reftype"] == "class" and word["reftarget"].islower():
                 word.replace_self(word.children)
+        # As in `import piezotrack as pt`.
+        for prefix in self.document.findall(addnodes.desc_addname):
+            text = prefix.astext().replace("piezotrack", "pt", 1)
+            prefix.clear()
+            prefix += nodes.Text(text)
         for node in list(self.document.findall(nodes.literal)):
             found = NAME.fullmatch(node.astext())
             if found is None or isinstance(node.parent, addnodes.pending_xref | nodes.reference):

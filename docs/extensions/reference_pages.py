@@ -10,10 +10,13 @@ import contextlib
 import inspect
 import io
 import os
+import re
 import types
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gallery import SCRIPTS
 from sphinx.util import logging
 
 if TYPE_CHECKING:
@@ -57,14 +60,11 @@ def places() -> dict[str, str]:
 
 def pages() -> dict[str, str]:
     """Return the text of each page, in Markdown, by its name without an ending."""
-    import piezotrack as pt
-
     names = places()
     written = {"commands": commands()}
     for room in ROOMS:
         own = [name for name, page in names.items() if page == room]
-        first = " ".join((inspect.getdoc(getattr(pt, room)) or "").partition("\n\n")[0].split())
-        written[room] = f"# pt.{room}\n\n{first}\n\n" + entries(own)
+        written[room] = f"# pt.{room}\n\n{first(f'piezotrack.{room}')}\n\n{entries(own)}"
     rest = [name for name, page in names.items() if page == "index"]
     listed = "\n".join(["commands", *ROOMS])
     written["index"] = (
@@ -77,16 +77,47 @@ def pages() -> dict[str, str]:
 
 def entries(names: list[str]) -> str:
     """Return the directives that document public names."""
-    return "\n".join(f"```{{eval-rst}}\n{entry(name)}\n```\n" for name in names)
+    rows = [f"| `{short(name)}` | {first(name)} |" for name in names]
+    blocks = [f"```{{eval-rst}}\n{entry(name)}{gallery(name)}\n```\n" for name in names]
+    return "\n".join(["| | |", "| --- | --- |", *rows, "", *blocks])
+
+
+def short(name: str) -> str:
+    """Return a public name as a user writes it."""
+    return name.replace("piezotrack", "pt", 1)
+
+
+def valued(name: str) -> Any:
+    """Return what has a public name."""
+    module, _, last = name.rpartition(".")
+    return getattr(import_module(module), last)
+
+
+def first(name: str) -> str:
+    """Return the first sentence of a docstring, for a cell of a table."""
+    value = valued(name)
+    text = union(value) if isinstance(value, types.UnionType) else inspect.getdoc(value) or ""
+    return " ".join(text.partition("\n\n")[0].split()).replace("``", "`").replace("|", "\\|")
+
+
+def union(value: types.UnionType) -> str:
+    """Name the types of a union, which cannot have a docstring."""
+    return f"One of {', '.join(f'`{kind.__name__}`' for kind in value.__args__)}."
+
+
+def gallery(name: str) -> str:
+    """Return the directive that shows the scripts of the gallery that use a name."""
+    use = re.compile(rf"\b{re.escape(short(name))}\b(?!\.[A-Z])")
+    if not any(use.search(script.read_text("utf-8")) for script in SCRIPTS.glob("*.py")):
+        return ""
+    return f"\n\n.. rubric:: In the gallery\n\n.. minigallery:: {name}"
 
 
 def entry(name: str) -> str:
     """Return the directive of one name."""
-    room, _, last = name.rpartition(".")
-    value = getattr(__import__(room, fromlist=[last]), last)
+    value = valued(name)
     if isinstance(value, types.UnionType):
-        kinds = ", ".join(f"`{kind.__name__}`" for kind in value.__args__)
-        return f".. py:data:: {name}\n\n   One of {kinds}."
+        return f".. py:data:: {name}\n\n   {union(value)}"
     if inspect.isclass(value) and issubclass(value, BaseException):
         return f".. autoexception:: {name}\n   :members:"
     if inspect.isclass(value):

@@ -2,8 +2,9 @@
 Record, identify and learn on a controller
 ==========================================
 
-A virtual controller by the protocol GCS of Physik Instrumente, over TCP: for one in the lab, put its
-address, ``gcs://192.168.0.10``, in place of ``server.address``. ``speed`` lets its time go faster.
+A virtual controller that speaks GCS, the protocol of Physik Instrumente, over TCP. For one in the
+lab put its address, ``gcs://192.168.0.10``, in place of ``server.address``. ``speed`` lets the time
+of the virtual one go faster.
 """
 
 import piezotrack as pt

@@ -24,9 +24,7 @@ triangle = pt.triangle(frequency=1.0, low=5e-6, high=42e-6, duration=4.0)
 # A stage that is its own model would flatter the controller: another model, from the other log,
 # stands for it.
 
-stage = pt.VirtualStage.of(
-    pt.identify(other[3.0:13.0], "prandtl-ishlinskii"), noise=65e-9, seed=1
-)
+stage = pt.VirtualStage.of(pt.identify(other[3.0:13.0], "prandtl-ishlinskii"), noise=65e-9, seed=1)
 run = pt.track(stage, loop, triangle)
 print(run.metrics)
 run.plot()

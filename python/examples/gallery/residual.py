@@ -2,8 +2,8 @@
 Where the error of a model comes from
 =====================================
 
-The residual of a fit, apart as noise, as what repeats with the drive, and as what depends on the
-voltage, the rate or the time.
+The residual of a fit over time, voltage, rate and amplitude, and the cause that explains most of
+it.
 """
 
 import piezotrack as pt

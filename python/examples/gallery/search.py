@@ -2,8 +2,8 @@
 A search and its descents
 =========================
 
-A first-order Dahl model is found by descents from random points. Where many of them end at one cost, it is
-likely to be the lowest.
+A first-order Dahl model is found by descents from random points. Where many of them end at one
+cost, it is likely to be the lowest.
 """
 
 import piezotrack as pt

@@ -1,9 +1,9 @@
 """
-With and without compensation
-=============================
+With and without feedback
+=========================
 
-A triangle of 37 um with a constant gain, with the inverse of the model, and with a PI feedback
-around it.
+A triangle of 37 um: with the inverse of the model alone, whose error is a constant offset for the
+most part, and with a PI feedback as well.
 """
 
 import matplotlib.pyplot as plt
@@ -13,9 +13,7 @@ import piezotrack as pt
 log = pt.datasets.dbo_training().zeroed()
 other = pt.datasets.dbo_tracking().zeroed()
 fit = pt.identify(log[3.0:13.0], "asymmetric-prandtl-ishlinskii")
-stage = pt.VirtualStage.of(
-    pt.identify(other[3.0:13.0], "prandtl-ishlinskii"), noise=65e-9, seed=1
-)
+stage = pt.VirtualStage.of(pt.identify(other[3.0:13.0], "prandtl-ishlinskii"), noise=65e-9, seed=1)
 triangle = pt.triangle(frequency=1.0, low=5e-6, high=42e-6, duration=3.0)
 feedback = pt.Pid.from_um(kp=0.03, ti=0.02)
 loops = {
