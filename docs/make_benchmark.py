@@ -17,11 +17,12 @@ DOCS = Path(__file__).parent
 BEGIN, END = "<!-- Table of piezotrack benchmark. -->", "<!-- End of the table. -->"
 # Headings of the columns: records are named as in the package.
 SHORT = {
-    "bouc-wen-benchmark": "Bouc-Wen benchmark",
+    "bouc-wen-benchmark": "Bouc-Wen",
+    "asymmetry": "asym.",
     "rate-0.1hz": "0.1 Hz",
     "rate-1hz": "1 Hz",
     "rate-10hz": "10 Hz",
-    "rate-three": "three rates",
+    "rate-three": "all rates",
 }
 
 
@@ -39,20 +40,18 @@ def table(results: list[dict[str, Any]]) -> str:
         key=lambda model: error(by.get((model, records[0]))),
     )
     lines = [
-        f"| model | K | {' | '.join(SHORT.get(name, name) for name in records)} |",
-        "| --- " * (len(records) + 2) + "|",
+        f"| model | {' | '.join(SHORT.get(name, name) for name in records)} |",
+        "| --- " * (len(records) + 1) + "|",
     ]
     for model in models:
-        first = by.get((model, records[0]))
         title = (
             "default"
             if model == "auto"
             else next(one["title"] for one in results if one["model"] == model)
         )
         errors = (error(by.get((model, record))) for record in records)
-        cells = ("-" if math.isinf(value) else f"{value:.3g}" for value in errors)
-        count = first["values"] if first and first["values"] is not None else "-"
-        lines.append(f"| {title} | {count} | {' | '.join(cells)} |")
+        cells = ("-" if math.isinf(value) else f"{value:.2g}" for value in errors)
+        lines.append(f"| {title} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
