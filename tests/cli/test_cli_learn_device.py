@@ -122,7 +122,7 @@ def test_the_limits_are_those_of_record_and_device_where_none_are_given(
 
 
 def test_a_controller_in_another_process_learns_the_same() -> None:
-    stage = ("--model", "stage.json", "--limits", "0:75", "--speed", "100")
+    stage = ("stage.json", "--limits", "0:75", "--speed", "100")
     with serving(*stage) as (_, address, _):
         printed = ran(*LEARN, "--device", address, "--trials", "4")
         there = pt.hardware.connect(address)
@@ -147,7 +147,7 @@ def test_a_controller_in_another_process_learns_the_same() -> None:
 def test_a_signal_leads_the_output_to_rest_and_keeps_the_table(
     number: signal.Signals, code: int, word: str
 ) -> None:
-    stage = ("--model", "stage.json", "--limits", "0:75", "--speed", "2")
+    stage = ("stage.json", "--limits", "0:75", "--speed", "2")
     with serving(*stage) as (_, address, _):
         work = [*COMMAND, *LEARN, "--device", address, "--rest", "2.5", "-o", "kept.csv"]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
