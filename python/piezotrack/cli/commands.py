@@ -16,7 +16,7 @@ from .error_messages import of_the_system, say
 from .help_page import coloured_help, list_page
 from .values import named, nearest
 
-__all__ = ["app", "run"]
+__all__ = ["COMMANDS", "app", "run"]
 
 # No window is ever opened.
 os.environ["MPLBACKEND"] = "Agg"
@@ -29,7 +29,7 @@ HEADINGS = {
     "device": ("measure", "play", "serve"),
     "research": ("demo", "compare-controllers", "benchmark", "reproduce"),
 }
-PLACES = {name: heading for heading, names in HEADINGS.items() for name in names}
+COMMANDS = {name: heading for heading, names in HEADINGS.items() for name in names}
 # Entry points of other packages: a command of click, or a function as `command` takes it.
 GROUP = "piezotrack.commands"
 END = """\
@@ -44,7 +44,7 @@ class Commands(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names, those of other packages last."""
         del ctx
-        return [*PLACES, *sorted(_others() - set(PLACES))]
+        return [*COMMANDS, *sorted(_others() - set(COMMANDS))]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return a command; one of the package is never replaced."""
@@ -52,8 +52,8 @@ class Commands(click.Group):
         if cmd_name in self.commands:
             return self.commands[cmd_name]
         name = cmd_name.replace("-", "_")
-        if cmd_name in PLACES:
-            module = import_module(f".{PLACES[cmd_name]}.{name}", __package__)
+        if cmd_name in COMMANDS:
+            module = import_module(f".{COMMANDS[cmd_name]}.{name}", __package__)
             found: click.Command = getattr(module, f"{name}_command")
         elif cmd_name in _others():
             from importlib.metadata import entry_points
@@ -64,7 +64,7 @@ class Commands(click.Group):
         else:
             return None
         found.name = cmd_name
-        if cmd_name in PLACES:
+        if cmd_name in COMMANDS:
             self.commands[cmd_name] = found
         return found
 
@@ -83,7 +83,7 @@ class Commands(click.Group):
         sections: dict[str, list[tuple[str, str]]] = {title: [] for title in HEADINGS}
         for name in names:
             one = self.get_command(ctx, name)
-            title = PLACES.get(name, "other packages")
+            title = COMMANDS.get(name, "other packages")
             sections.setdefault(title, []).append((name, (one and one.short_help) or ""))
         usage = "Usage: piezotrack [--version] [--help] COMMAND ..."
         return list_page(usage, self.help or "", sections, END)
