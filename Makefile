@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs reference architecture refused notices c-library c-header c-header-test clean
+.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs crate-docs architecture pictures notices c-library c-header c-header-test clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -95,17 +95,18 @@ c-header-test:
 bench: ## Criterion benches: throughput of the swarm, latency of a step
 	cargo bench --locked
 
-docs: ## The crates' pages
+# Warnings end the build: dead links, pages without a place, public names without an entry.
+docs: $(VENV)/installed $(VENV)/site-tools ## The site: target/site/index.html; pages, reference, gallery
+	$(BIN)/sphinx-build -q -W --keep-going -j auto -d target/site-cache docs target/site
+
+crate-docs: ## The crates' pages: target/doc
 	cargo doc --locked --no-deps
 
-reference: $(VENV)/installed ## Write docs/reference from the commands and docstrings
-	$(BIN)/python docs/make_reference.py
-
-architecture: $(VENV)/installed ## Draw docs/architecture.svg and write the tree of its page, from the code
+architecture: $(VENV)/installed ## Draw docs/architecture.svg from the code
 	$(BIN)/python docs/make_architecture.py
 
-refused: $(VENV)/installed $(VENV)/tools ## Write docs/refused-logs.md: bad logs, and what is said of each
-	$(BIN)/python docs/make_refused_logs.py
+pictures: $(VENV)/installed ## Draw the pictures of the pages that no example draws
+	$(BIN)/python docs/make_pictures.py
 
 notices: ## Write THIRD-PARTY.txt: the licences of the crates that are linked in
 	$(PYTHON) docs/make_notices.py
@@ -133,4 +134,8 @@ $(VENV)/installed: $(WHEELS)/built
 
 $(VENV)/tools: $(VENV)/pip pyproject.toml
 	$(BIN)/python -m pip install --quiet --group test
+	@touch $@
+
+$(VENV)/site-tools: $(VENV)/pip pyproject.toml
+	$(BIN)/python -m pip install --quiet --group docs
 	@touch $@

@@ -3,7 +3,7 @@
 Run as ``python compare_models.py FOLDER [OUT]``, with training.csv and tracking.csv of Aye and
 Ang's piezo stack in the folder (github.com/yan9a/DiscreteBacklashOperator, columns time_s,
 voltage_V, displacement_um). Without arguments it makes two logs on the virtual stage. Prints the
-table of docs/choose-a-model.md and writes its picture, comparison.png.
+table of docs/models.md and writes its picture, comparison.png.
 """
 
 from __future__ import annotations

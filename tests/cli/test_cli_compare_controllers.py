@@ -9,7 +9,7 @@ import pytest
 
 from commands import ran, refusal
 from loops import model_text
-from piezotrack.cli.loops.compare_controllers import SPELLINGS
+from piezotrack.cli.research.compare_controllers import SPELLINGS
 from piezotrack.control.comparing.contenders import CONTENDERS
 
 COMPARE = ("compare-controllers", "dahl.json", "--stage", "xu-li-2010", "--dt", "0.02")

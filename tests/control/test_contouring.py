@@ -310,7 +310,7 @@ def test_the_numbers_are_those_of_the_paper() -> None:
 def test_the_nine_circles_are_near_the_published_ones() -> None:
     """No circle is worse than published by half, and the order is the paper's.
 
-    What the paper's stage adds at higher frequencies is not on this stage: docs/paper.md.
+    What the paper's stage adds at higher frequencies is not on this stage: docs/evidence.md.
     """
     for case, run in zip(PUBLISHED, table().runs, strict=True):
         assert run.path.period == pytest.approx(1.0 / case.frequency)

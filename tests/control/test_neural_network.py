@@ -140,7 +140,7 @@ def test_records_that_cannot_be_trained_on() -> None:
 
 
 def test_on_measured_logs_beside_the_inverse_of_the_plays() -> None:
-    """The figures of docs/tracking.md: the drive of one log, by inverses from the other."""
+    """The figures of docs/control.md: the drive of one log, by inverses from the other."""
     rich = pt.datasets.dbo_tracking()[3.0:43.0]
     other = pt.datasets.dbo_training().full
     network = train_network(rich, delay=0.005)

@@ -29,7 +29,7 @@ CURVE = {"time": T, "height (piezo)": 1e-6 * U, "height (measured)": 1e-6 * Y}
 
 @dataclass(frozen=True)
 class Kind:
-    """A format: its name on the page, the name of a file, how a sound one is written.
+    """A format: its name, the name of a file, how a sound one is written.
 
     `timed` says that it has a column of times, `library` and `extra` what reads it.
     """

@@ -14,7 +14,7 @@ from typer import testing
 import piezotrack as pt
 from piezotrack.cli.advice import as_options, command_at_work
 from piezotrack.cli.commands import app
-from piezotrack.cli.models.identify import identify_command
+from piezotrack.cli.identify.identify import identify_command
 from piezotrack.data.log_file import write_log
 from records import BOX, HELD, quick
 

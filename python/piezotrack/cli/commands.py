@@ -11,29 +11,29 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from .. import __version__
-from .demonstrations.demo import demo_command
-from .demonstrations.reproduce import reproduce_command
-from .devices.measure import measure_command
-from .devices.serve import serve_command
+from .control.contour import contour_command
+from .control.export import export_command
+from .control.learn import learn_command
+from .control.simulate import simulate_command
+from .control.track import feedforward_command, track_command
+from .control.tune import tune_command
+from .data.convert import convert_command
+from .data.info import info_command
+from .data.noise import noise_command
+from .device.measure import measure_command
+from .device.play import play_command
+from .device.serve import serve_command
 from .error_messages import of_the_system
-from .logs.convert import convert_command
-from .logs.info import info_command
-from .loops.compare_controllers import compare_controllers_command
-from .loops.contour import contour_command
-from .loops.export import export_command
-from .loops.learn import learn_command
-from .loops.play import play_command
-from .loops.track import feedforward_command, track_command
-from .loops.tune import tune_command
-from .models.benchmark import benchmark_command
-from .models.campaign import campaign_command
-from .models.compare import compare_command
-from .models.identify import identify_command
-from .models.noise import noise_command
-from .models.simulate import simulate_command
-from .models.step import step_command
-from .models.suggest import suggest_command
-from .models.watch import watch_command
+from .identify.campaign import campaign_command
+from .identify.compare import compare_command
+from .identify.identify import identify_command
+from .identify.step import step_command
+from .identify.suggest import suggest_command
+from .identify.watch import watch_command
+from .research.benchmark import benchmark_command
+from .research.compare_controllers import compare_controllers_command
+from .research.demo import demo_command
+from .research.reproduce import reproduce_command
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -53,7 +53,7 @@ class Score:
 
     @property
     def fit_percent(self) -> float:
-        """Share of the motion that the model explains, 100 (1 - |y - x| / |y - mean y|) [%].
+        """Share of the motion that the model explains, ``100 (1 - |y - x| / |y - mean y|)`` [%].
 
         100 for an exact model; 0 for one that is no better than the mean of the record.
         """

@@ -1,0 +1,190 @@
+"""``piezotrack serve``: a stage behind the protocol of a controller, or as records of EPICS."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from ...errors import ParameterError
+from ..connection import connected
+from ..error_messages import report_errors
+from ..options import number_range, refuse_without_effect
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from typing import TypeAlias
+
+    from ...hardware.device import Device
+    from ...hardware.virtual import VirtualDevice
+    from ...stages.virtual import VirtualStage
+
+    Limits: TypeAlias = tuple[float, float]
+    # The address, and the limits [V].
+    Served: TypeAlias = Iterator[tuple[str, Limits]]
+
+__all__ = ["serve_command"]
+
+PORTS = {"gcs": 50000, "scpi": 5025}
+# Options of the other protocols.
+OTHERS = {
+    "gcs": (("prefix", "device"), "with gcs"),
+    "scpi": (("prefix", "device", "abandoned"), "with scpi"),
+    "epics": (
+        ("host", "port", "abandoned"),
+        "with epics, which listens where EPICS_CAS_INTF_ADDR_LIST and EPICS_CA_SERVER_PORT say",
+    ),
+}
+
+
+@report_errors
+def serve_command(
+    context: typer.Context,
+    protocol: Annotated[
+        Literal["gcs", "scpi", "epics"],
+        typer.Argument(
+            metavar="PROTOCOL",
+            help="gcs: PI's command set, over TCP; scpi: a small instrument with messages as VOLT "
+            "and MEAS?; epics: records over Channel Access.",
+        ),
+    ],
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="MODEL", help="Model file in JSON; default the stage of Xu and Li 2010."
+        ),
+    ] = None,
+    limits: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LOW:HIGH", help="Lowest and highest voltage in V; default those of the stage."
+        ),
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen at; by default only this computer reaches it.")
+    ] = "127.0.0.1",
+    port: Annotated[
+        int | None,
+        typer.Option(help="TCP port; 0 for any free one; default 50000, of scpi 5025."),
+    ] = None,
+    speed: Annotated[float, typer.Option(help="How much faster than real time it goes.")] = 1.0,
+    abandoned: Annotated[
+        Literal["runs", "stops", "rests"],
+        typer.Option(
+            help="What becomes of a wave of gcs whose client has gone: it runs on, as with a real "
+            "controller, stops where it is, or is led to rest at 0 V."
+        ),
+    ] = "runs",
+    prefix: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="First part of the names of epics' records, as LAB:STAGE."
+        ),
+    ] = None,
+    device: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Device, as of `measure`, that epics publishes in the place of a virtual stage.",
+        ),
+    ] = None,
+) -> None:
+    """Serve a virtual stage as a controller.
+
+    Software that controls a stage can test against it; epics also publishes a real device.
+
+    It prints what it serves, and goes on until Ctrl-C or SIGTERM.
+    """
+    refuse_without_effect(context, *OTHERS[protocol])
+    if device is not None:
+        refuse_without_effect(context, ("model", "limits", "speed"), "with --device")
+    if protocol == "epics":
+        if prefix is None:
+            raise ParameterError("--prefix", "missing", "the start of names, as LAB:STAGE")
+        with _published(device, model, limits, speed) as one:
+            _epics(one, prefix)
+        return
+    stage, within = _stage(model, limits)
+    place = PORTS[protocol] if port is None else port
+    serving = _scpi if protocol == "scpi" else partial(_gcs, abandoned=abandoned)
+    with serving(stage, within, host, place, speed) as (address, (low, high)):
+        print(f"listening from {low:g} to {high:g} V at {address}", flush=True)
+        threading.Event().wait()
+
+
+def _stage(model: Path | None, limits: str | None) -> tuple[VirtualStage, Limits | None]:
+    """Return the virtual stage of the options, with its limits [V]; None for the amplifier's."""
+    from ...hardware.virtual import virtual_stage
+
+    stage, known = virtual_stage(model)
+    within = known if limits is None else number_range("--limits", limits)
+    if within is None and not all(map(math.isfinite, stage.amplifier.limits)):
+        raise ParameterError(
+            "--limits",
+            f"not given, and {model} does not say with which voltages it was identified",
+            "--limits LOW:HIGH",
+        )
+    return stage, within
+
+
+def _timed(stage: VirtualStage, limits: Limits | None, speed: float) -> VirtualDevice:
+    """Return a stage as a device whose time goes faster."""
+    from ..._support.arguments import positive
+    from ...hardware.virtual import VirtualDevice
+
+    speed = positive("speed", speed, "times real time")
+    return VirtualDevice(stage, limits=limits, clock=lambda: speed * time.monotonic())
+
+
+@contextmanager
+def _gcs(
+    stage: VirtualStage,
+    limits: Limits | None,
+    host: str,
+    port: int,
+    speed: float,
+    abandoned: Literal["runs", "stops", "rests"],
+) -> Served:
+    from ...adapters.simulators.gcs.server import GcsServer
+
+    options: dict[str, Any] = {"host": host, "port": port, "speed": speed, "abandoned": abandoned}
+    with GcsServer(stage, limits=limits, **options) as server:
+        yield server.address, server.limits
+
+
+@contextmanager
+def _scpi(stage: VirtualStage, limits: Limits | None, host: str, port: int, speed: float) -> Served:
+    from ...adapters.simulators.virtual_scpi import VirtualScpi
+
+    device = _timed(stage, limits, speed)
+    with VirtualScpi(device, host=host, port=port) as server:
+        name, number = server.address
+        low, high = device.limits
+        yield f"scpi://{name}:{number}?unit=um&limits={low:g}..{high:g}V", device.limits
+
+
+@contextmanager
+def _published(
+    address: str | None, model: Path | None, limits: str | None, speed: float
+) -> Iterator[Device]:
+    """Connect to the device of an address; without one make a virtual one of the options."""
+    if address is None:
+        yield _timed(*_stage(model, limits), speed)
+        return
+    with connected(address) as device:
+        yield device
+
+
+def _epics(device: Device, prefix: str) -> None:
+    from ...adapters.epics import RECORDS, serve_epics
+
+    low, high = device.limits
+    records = ", ".join(f"{prefix}:{name}" for name in RECORDS)
+    words = f"serving {records} of {device.channels[0]}, {low:g} to {high:g} V"
+    serve_epics(device, prefix, ready=lambda: print(words, flush=True))
