@@ -10,7 +10,7 @@ import numpy as np
 
 import piezotrack as pt
 from campaigns import QUICK
-from piezotrack.cli.demonstrations.loop_plot import plot_before_and_after
+from piezotrack.cli.research.loop_plot import plot_before_and_after
 from piezotrack.control.views.tracking_plot import plot_feedforward
 from piezotrack.hardware.virtual import VirtualDevice
 from piezotrack.identification.views.plot import plot_response
