@@ -345,7 +345,7 @@ def test_every_path_has_figures_words_and_a_picture(name: str) -> None:
     figure.canvas.draw()
     assert len(figure.axes) == 5
     for ax in figure.axes:
-        assert ax.get_ylabel().endswith("[um]")
+        assert ax.get_ylabel().endswith("[\N{MICRO SIGN}m]")
         low, high = ax.get_ylim()
         y = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in ax.lines])
         assert np.isfinite(y).all()
@@ -361,9 +361,9 @@ def test_the_table_has_words_and_a_picture() -> None:
     figure = table().plot()
     figure.canvas.draw()
     assert [ax.get_ylabel() for ax in figure.axes[2:]] == [
-        "peak to peak [um]",
-        "mean [um]",
-        "SD [um]",
+        "peak to peak [\N{MICRO SIGN}m]",
+        "mean [\N{MICRO SIGN}m]",
+        "SD [\N{MICRO SIGN}m]",
     ]
     plt.close(figure)
 

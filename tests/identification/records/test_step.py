@@ -456,9 +456,9 @@ def test_the_picture_has_peaks_and_units() -> None:
     figure = step.plot()
     left, right = figure.axes
     assert left.get_xlabel() == "time after the step [ms]"
-    assert left.get_ylabel() == "displacement [um]"
+    assert left.get_ylabel() == "displacement [\N{MICRO SIGN}m]"
     assert right.get_xlabel() == "frequency [Hz]"
-    assert right.get_ylabel() == "gain [um/V]"
+    assert right.get_ylabel() == "gain [\N{MICRO SIGN}m/V]"
     marks = next(line for line in left.lines if line.get_label() == "overshoot peaks")
     assert list(np.asarray(marks.get_ydata())) == [1e6 * peak for peak in step.readings.peaks]
     plt.close(figure)

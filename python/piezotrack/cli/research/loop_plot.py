@@ -13,9 +13,11 @@ from ..._support.display.plot_style import (
     FEEDFORWARD,
     GUIDE,
     RECORDED,
+    drawing,
     heading,
     legend_inside,
-    panels,
+    sheet,
+    trace,
     whole,
 )
 
@@ -38,6 +40,7 @@ STYLES: tuple[dict[str, Any], ...] = (
 )
 
 
+@drawing
 def plot_before_and_after(
     runs: Mapping[str, Tracking], fig: Figure | SubFigure | None = None
 ) -> Figure:
@@ -55,24 +58,24 @@ def plot_before_and_after(
     matplotlib.figure.Figure
         The figure drawn in.
     """
-    figure = panels(fig, (10.0, 7.4))
-    grid = figure.add_gridspec(2, 2, height_ratios=[1.7, 1.0])
+    rows = (("before", "after"), ("error", "error"))
+    figure, axes = sheet(fig, (10.0, 7.4), rows, heights=(1.7, 1.0))
     names = list(runs)
-    left = figure.add_subplot(grid[0, 0])
-    right = figure.add_subplot(grid[0, 1], sharex=left, sharey=left)
+    left, right, below = (axes[name] for name in ("before", "after", "error"))
+    right.sharex(left)
+    right.sharey(left)
     for ax, when, name in ((left, "Before", names[0]), (right, "After", names[-1])):
         _plot_loop(ax, runs[name])
         rms = 1e6 * runs[name].metrics.rms_error
         heading(ax, f"{when}: {name}, error {rms:.2g} um rms")
     # Below the lines there is room.
     left.legend(loc="lower right", fontsize="small", edgecolor="none")
-    below = figure.add_subplot(grid[1, :])
     for name, style in zip(names, STYLES, strict=True):
         part = _settled(runs[name])
-        below.plot(runs[name].t[part], 1e6 * runs[name].error[part], **style, label=name)
+        error = 1e6 * runs[name].error[part]
+        trace(below, runs[name].t[part], error, {**style, "label": name})
     below.axhline(0.0, **GUIDE)
-    below.set(xlabel="time [s]", ylabel="error = desired - actual [um]")
-    below.margins(x=0.0)
+    below.set(xlabel="time [s], after the smooth start", ylabel="desired - measured [um]")
     legend_inside(below)
     return whole(figure)
 
@@ -83,7 +86,7 @@ def _settled(run: Tracking) -> NDArray[np.bool_]:
 
 def _plot_loop(ax: Axes, run: Tracking) -> None:
     part = _settled(run)
-    ax.plot(1e6 * run.desired[part], 1e6 * run.measured[part], **ACTUAL)
+    ax.plot(1e6 * run.desired[part], 1e6 * run.measured[part], **{**ACTUAL, "label": "measured"})
     ends = 1e6 * np.array([run.desired.min(), run.desired.max()])
     ax.plot(ends, ends, **DESIRED)
-    ax.set(xlabel="desired displacement [um]", ylabel="actual displacement [um]")
+    ax.set(xlabel="desired displacement [um]", ylabel="measured displacement [um]")

@@ -9,11 +9,13 @@ import numpy as np
 from ..._support.display.plot_style import (
     GUIDE,
     MODELS,
-    few_ticks,
-    folded,
+    caption,
+    drawing,
     heading,
+    is_narrow,
     literal,
-    panels,
+    names_beside,
+    sheet,
     whole,
 )
 from ..campaigns.result import size_of
@@ -29,12 +31,11 @@ __all__ = ["plot_campaign"]
 MARKERS = "osD^vP"
 # Records that are named beside their lines; more are numbered.
 NAMED = 40
-# Letters of a name.
-LABEL = 28
 # A cost this far above the lowest is drawn, in per cent; a seed without a difference is put here.
 EQUAL = 1e-3
 
 
+@drawing
 def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw the costs of a campaign.
 
@@ -52,13 +53,18 @@ def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> 
     """
     several = any(len(group) > 1 for group in campaign.groups.values())
     height = 2.3 + min(0.35 * len(campaign.records), 9.0)
-    figure = panels(fig, (11.0 if several else 7.5, height))
-    axes = figure.subplots(1, 2 if several else 1, sharey=True, squeeze=False)[0]
+    names = ("costs", "apart") if several else ("costs",)
+    least = 1.0 + min(0.2 * len(campaign.records), 6.0)
+    figure, panel = sheet(fig, (11.0 if several else 7.5, height), (names,), least=least)
+    axes = list(panel.values())
     _costs(campaign, axes[0])
     if several:
         _apart(campaign, axes[1])
-    _records(campaign, axes[0])
-    figure.suptitle(size_of(campaign), fontsize="large")
+    for ax in axes:
+        _records(campaign, ax)
+        if ax is not axes[0] and not is_narrow(fig, (11.0, height)):
+            ax.tick_params(labelleft=False)
+    caption(figure, size_of(campaign))
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
         figure.legend(
@@ -108,7 +114,6 @@ def _costs(campaign: Campaign, ax: Axes) -> None:
     else:
         # Room for the crosses at the edge.
         ax.set_xlim(0.0, 1.1 * high)
-        few_ticks(ax)
     if campaign.failed:
         ax.plot(
             [0.985] * len(campaign.failed),
@@ -158,10 +163,8 @@ def _records(campaign: Campaign, ax: Axes) -> None:
     count = len(records)
     ax.set_ylim(count + 0.5, 0.5)
     if count <= NAMED:
-        ax.set_yticks(range(1, count + 1), [literal(folded(title, LABEL)) for title in records])
+        names_beside(ax, range(1, count + 1), list(records))
     else:
         ax.set_ylabel("record, in the order given")
     for place in np.arange(1.5, count) if count <= NAMED else []:
         ax.axhline(place, **GUIDE)
-        if len(ax.figure.axes) > 1:
-            ax.figure.axes[1].axhline(place, **GUIDE)

@@ -6,7 +6,7 @@ from itertools import pairwise
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from ..._support.display.plot_style import without_glyph_warnings
+from ..._support.display.look import without_glyph_warnings
 from ..._support.files.writing import make_folder, replacing, result_set, write_document
 from ..reproduction import REPORT
 from .figures import Drawn, drawn
