@@ -163,7 +163,7 @@ def run() -> None:
     """Run the command with the arguments of the process."""
     try:
         try:
-            app()
+            app(prog_name="piezotrack")
         finally:
             sys.stdout.flush()
     except OSError as error:
