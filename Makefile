@@ -115,6 +115,7 @@ clean: ## Remove what was built, not your results
 	rm -rf $(VENV) target demo report
 
 $(VENV)/pip:
+	@command -v cargo >/dev/null || { echo "A Rust toolchain is needed, there is no cargo: install it from https://rustup.rs" >&2; exit 1; }
 	$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(None if v >= (3, 11) else f"Python 3.11 or newer is needed, this is {v.major}.{v.minor}")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1' 'maturin>=1.9,<2'

@@ -56,6 +56,8 @@ python_maximum_signature_line_length = 80
 html_math_renderer = "mathml"
 
 html_theme = "furo"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 html_title = f"piezotrack {release}"
 html_show_sphinx = False
 html_show_copyright = False

@@ -77,9 +77,9 @@ def pages() -> dict[str, str]:
 
 def entries(names: list[str]) -> str:
     """Return the directives that document public names."""
-    rows = [f"| `{short(name)}` | {first(name)} |" for name in names]
+    rows = [f"- `{short(name)}`: {first(name)}" for name in names]
     blocks = [f"```{{eval-rst}}\n{entry(name)}{gallery(name)}\n```\n" for name in names]
-    return "\n".join(["| | |", "| --- | --- |", *rows, "", *blocks])
+    return "\n".join([*rows, "", *blocks])
 
 
 def short(name: str) -> str:
@@ -94,10 +94,10 @@ def valued(name: str) -> Any:
 
 
 def first(name: str) -> str:
-    """Return the first sentence of a docstring, for a cell of a table."""
+    """Return the first sentence of a docstring, in one line of Markdown."""
     value = valued(name)
     text = union(value) if isinstance(value, types.UnionType) else inspect.getdoc(value) or ""
-    return " ".join(text.partition("\n\n")[0].split()).replace("``", "`").replace("|", "\\|")
+    return " ".join(text.partition("\n\n")[0].split()).replace("``", "`")
 
 
 def union(value: types.UnionType) -> str:
