@@ -23,7 +23,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_own_logs_are_compared_and_written() -> None:
-    words = ran("benchmark", "log.csv", *PLAYS, "--train", ":2.5", "--out", "board")
+    words = ran("benchmark", "log.csv", *PLAYS, "--window", ":2.5", "--out", "board")
     assert "log.csv (stroke" in words
     assert "fifteen lines" in words
     document = json.loads(Path("board/benchmark.json").read_text(encoding="utf-8"))
@@ -37,7 +37,7 @@ def test_own_logs_are_compared_and_written() -> None:
     assert Path("board/benchmark.md").read_text(encoding="utf-8").startswith("**log.csv")
     # The same again computes nothing; --overwrite does.
     file.write_text(json.dumps({**kept, "seconds": 77.0}), encoding="utf-8")
-    again = ("benchmark", "log.csv", *PLAYS, "--train", ":2.5", "--out", "board", "--json")
+    again = ("benchmark", "log.csv", *PLAYS, "--window", ":2.5", "--out", "board", "--json")
     assert json.loads(ran(*again))["results"][0]["seconds"] == 77.0
     assert json.loads(ran(*again, "--overwrite"))["results"][0]["seconds"] < 77.0
 
@@ -67,8 +67,8 @@ def test_a_list_says_of_each_log_what_is_fitted() -> None:
     Path("second.csv").write_text("\n".join(map(",".join, steeper)), encoding="utf-8")
     Path("logs").mkdir()
     Path("logs/list.txt").write_text(
-        "# my stages\n\n../log.csv train=0.5:2 test=2:3  # the old one\n"
-        "../second.csv other=../log.csv other-test=1:\n",
+        "# my stages\n\n../log.csv window=0.5:2 test-window=2:3  # the old one\n"
+        "../second.csv other=../log.csv other-window=1:\n",
         encoding="utf-8",
     )
     ran("benchmark", "--list", "logs/list.txt", *PLAYS, "--quiet")
@@ -83,15 +83,15 @@ def test_a_list_says_of_each_log_what_is_fitted() -> None:
     [
         (["--model", "dal"], "models has 'dal'"),
         (["--record", "none"], "records has 'none'"),
-        (["--train", "1:2"], "--train has no effect without a FILE"),
+        (["--window", "1:2"], "--window has no effect without a FILE"),
         (["--dt", "0.1"], "--dt has no effect without a FILE or --list"),
         (["--list", "gone.txt"], "gone.txt cannot be read"),
         (["--list", "empty.txt"], "empty.txt: no log is listed"),
         (["--list", "bad.txt"], "bad.txt:2: 'from=3': expected NAME=VALUE"),
-        (["--list", "window.txt"], "window.txt:1: other-test has no effect without other="),
+        (["--list", "window.txt"], "window.txt:1: other-window has no effect without other="),
         (["log.csv", "log.csv"], "records has log.csv twice"),
-        (["log.csv", "--train", "3"], "--train is '3'"),
-        (["log.csv", "--train", "30:40"], "log.csv: train"),
+        (["log.csv", "--window", "3"], "--window is '3'"),
+        (["log.csv", "--window", "30:40"], "log.csv: train"),
         (["gone.csv"], "gone.csv: there is no such file"),
         (["--json", "--quiet"], "--json and --quiet"),
         (["log.csv", "--model", "discrete-backlash"], "no model was found of any record"),
@@ -99,6 +99,6 @@ def test_a_list_says_of_each_log_what_is_fitted() -> None:
 )
 def test_wrong_options_are_named(options: list[str], words: str) -> None:
     Path("empty.txt").write_text("# nothing\n", encoding="utf-8")
-    Path("window.txt").write_text("log.csv other-test=3:\n", encoding="utf-8")
+    Path("window.txt").write_text("log.csv other-window=3:\n", encoding="utf-8")
     Path("bad.txt").write_text("log.csv\nlog.csv from=3\n", encoding="utf-8")
     assert words in refusal("benchmark", *options)

@@ -79,8 +79,8 @@ def test_logs_of_one_name_are_told_apart_by_their_folders() -> None:
         ("a.csv --seeds x", "--seeds is 'x': expected a number, as 10, or A:B, as 10:20"),
         ("a.csv --seeds 4:4", "--seeds is '4:4'"),
         ("a.csv --model prandtl-ishlinskii --seeds 2", "--seeds has no effect with models that"),
-        ("a.csv --workers 0", "--workers is 0: expected 1 to 256"),
-        ("a.csv --workers 2 --dask x:1", "--workers and --dask: expected one of them at most"),
+        ("a.csv --threads 0", "--threads is 0: expected 1 to 256"),
+        ("a.csv --threads 2 --dask x:1", "--threads and --dask: expected one of them at most"),
         ("a.csv --window 9:10", "a.csv: --window 9:10: the window from 9 s"),
         ("a.csv --out a.csv", "--out: a.csv cannot be made a folder: a.csv is a file"),
         ("a.csv --out .", "has 'a.csv', 'b.csv', 'flat.csv' and no campaign.json: expected an em"),
@@ -94,7 +94,7 @@ def test_what_cannot_be_is_refused(arguments: str, sentence: str) -> None:
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for a single process")
 def test_ctrl_c_says_how_far_it_came() -> None:
     """In the middle of a search of ten thousand restarts."""
-    many = ["--model", "dahl", "--runs", "10000", "--model", PLAYS, "--workers", "2"]
+    many = ["--model", "dahl", "--runs", "10000", "--model", PLAYS, "--threads", "2"]
     with subprocess.Popen(
         [*COMMAND, "campaign", "a.csv", *many], stderr=subprocess.PIPE, text=True
     ) as process:

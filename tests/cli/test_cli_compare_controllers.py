@@ -23,7 +23,9 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.slow
 def test_controllers_are_compared_and_written() -> None:
-    words = ran(*COMPARE, "--controllers", "inverse, PID", "--rates", "0.5,1,2", "--seeds", "2")
+    words = ran(
+        *COMPARE, "--controllers", "inverse, PID", "--frequencies", "0.5,1,2", "--draws", "2"
+    )
     assert "true error in nm rms at 50 Hz, mean of 2 draws of the noise" in words
     assert max(map(len, words.splitlines())) <= 100
     document = json.loads(Path("results/controllers.json").read_text(encoding="utf-8"))
@@ -42,11 +44,11 @@ def test_controllers_are_compared_and_written() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--rates", "1,2"], "--rates is '1,2'"),
-        (["--rates", "3,2,1"], "in rising order"),
+        (["--frequencies", "1,2"], "--frequencies is '1,2'"),
+        (["--frequencies", "3,2,1"], "in rising order"),
         (["--controllers", "pid"], "is 'pid'"),
         (["--sensitivity", "0.5"], "is 0.5"),
-        (["--seeds", "0"], "seeds is 0: expected 1 to 100"),
+        (["--draws", "0"], "--draws is 0: expected 1 to 100"),
     ],
 )
 def test_wrong_options_are_named(options: list[str], words: str) -> None:

@@ -24,7 +24,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_contour_writes_what_python_finds() -> None:
-    printed = ran("contour", "dahl.json", "--path", "circle:0.5Hz,10um", *PAPER)
+    printed = ran("contour", "dahl.json", "circle:0.5Hz,10um", *PAPER)
     written = sorted(path.name for path in Path("results").iterdir())
     assert written == ["contour.csv", "contour.json", "contour.png", "contour.svg"]
     one = loop(feedforward=fitted().inverse(), feedback=PID)
@@ -48,7 +48,7 @@ def test_two_models_are_the_two_axes() -> None:
     """In the middle of their workspace, from where they rest, with the interval of the record."""
     other = replace(pt.load("dahl.json"), offset=5e-6)
     other.save("other.json")
-    course = ("--path", "circle:1Hz,10um,4s", "--dt", "0.002", "--cross-talk", "0.05:0.02")
+    course = ("circle:1Hz,10um,4s", "--dt", "0.002", "--cross-talk", "0.05:0.02")
     printed = ran("contour", "dahl.json", "other.json", *course)
     assert printed.startswith("stage: dahl.json and other.json: y lags by 0 s, 5 % of y in x")
     fits = [pt.load("dahl.json"), other]
@@ -75,7 +75,7 @@ def test_other_models_are_the_stage_of_both_axes() -> None:
     for name, factor in (("x", 1.1), ("y", 0.9)):
         stage = replace(known.model, piezo_coefficient=factor * known.model.piezo_coefficient)
         replace(known, model=stage).save(f"{name}.json")
-    course = ("--path", "circle:1Hz,10um,4s", "--dt", "0.002", "--stage", "x.json")
+    course = ("circle:1Hz,10um,4s", "--dt", "0.002", "--stage", "x.json")
     printed = ran("contour", "dahl.json", *course, "--stage", "y.json")
     assert printed.startswith("stage: x.json and y.json: ")
     rows = table("results/contour.csv")
@@ -98,21 +98,30 @@ def test_each_axis_may_have_its_own_gain() -> None:
         pt.identification.IdentifiedModel(
             model=replace(stage, linear=linear), offset=0.0, offset_fitted=True, stroke=50e-6
         ).save(name)
-    course = "contour x.json y.json --path circle:0.5Hz,2um --dt 0.005 --limits 0:75 --ti 0.02"
-    printed = ran(*course.split(), "--kp", "0.05,-0.25", "--no-feedforward")
+    for name, kp in (("x", 0.05), ("y", -0.25)):
+        pt.Controller(
+            dt=0.005,
+            limits=(0.0, 75.0),
+            feedforward=pt.load(f"{name}.json").inverse(),
+            feedback=pt.Pid.from_um(kp=kp, ti=0.02),
+        ).save(f"loop_{name}.json")
+    course = "circle:0.5Hz,2um"
+    printed = ran("contour", "loop_x.json", "loop_y.json", course)
     assert "contour error" in printed
+    assert "controllers of files" in printed
+    options = "--dt 0.005 --limits 0:75 --kp 0.05 --ti 0.02 --no-feedforward --out same"
     assert "y: the loop is unstable" in refusal(
-        *course.split(), "--kp", "0.05", "--no-feedforward", "--overwrite"
+        "contour", "x.json", "y.json", course, *options.split()
     )
-    assert "--kp is '1,2,3': expected one gain, or KX,KY" in refusal(
-        *course.split(), "--kp", "1,2,3"
-    )
+    own = refusal("contour", "loop_x.json", "loop_y.json", course, "--kp", "1", "--ti", "0.1")
+    assert own.startswith("--kp has no effect with controller files")
+    assert "two models, or two controllers" in refusal("contour", "x.json", "loop_y.json", course)
 
 
 @pytest.mark.usefixtures("_no_pictures")
 def test_the_options_reach_the_stage_and_the_loops() -> None:
     options = (
-        "--path lissajous:0.5/1Hz,5/5um --lag 0.04 --cross-talk 0.1:-0.08 --decouple --kp 0.1 "
+        "lissajous:0.5/1Hz,5/5um --lag 0.04 --cross-talk 0.1:-0.08 --decouple --kp 0.1 "
         "--duration 4 --out a/b --seed 3"
     )
     printed = ran("contour", *options.split())
@@ -126,49 +135,23 @@ def test_a_file_is_run_again_and_again() -> None:
     rows = zip(0.01 * np.arange(200), 50 + 8 * np.cos(angle), 50 + 4 * np.sin(angle), strict=True)
     text = "\n".join(f"{t:.2f},{x:.9f},{y:.9f}" for t, x, y in rows)
     Path("ellipse.csv").write_text("time_s,x_um,y_um\n" + text + "\n", encoding="utf-8")
-    printed = ran("contour", "--path", "ellipse.csv", "--period", "2", "--duration", "6")
+    printed = ran("contour", "ellipse.csv", "--period", "2", "--duration", "6")
     assert "XYReference(ellipse.csv, 42 to 58 by 46 to 54 um, 6 s)" in printed
     rows_written = table("results/contour.csv")
     assert rows_written["desired_x_um"][0] == 0.0
     assert np.abs(rows_written["contour_error_um"][100:]).max() < 1.5
     assert "--period is for a path from a file" in refusal(
-        "contour", "--path", "circle:1Hz,1um", "--period", "2"
+        "contour", "circle:1Hz,1um", "--period", "2"
     )
 
 
 def test_a_path_may_have_the_name_of_a_formula() -> None:
     rows = "\n".join(f"{k / 50:.2f},{10 + 0.01 * k:.6f},{10 - 0.01 * k:.6f}" for k in range(60))
     Path(r"$\foo$.csv").write_text("time_s,x_um,y_um\n" + rows + "\n", encoding="utf-8")
-    printed = ran("contour", "dahl.json", "--path", r"$\foo$.csv", "--beyond-reach", *PAPER)
+    printed = ran("contour", "dahl.json", r"$\foo$.csv", "--beyond-reach", *PAPER)
     assert r"$\foo$.csv" in printed
     written = sorted(path.name for path in Path("results").iterdir())
     assert written == ["contour.csv", "contour.json", "contour.png", "contour.svg"]
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("_no_pictures_at_all")
-def test_table_2_is_one_command() -> None:
-    printed = ran("contour", "--table-2")
-    assert "a model of x, fitted to" in printed
-    rows = table("results/table_2.csv")
-    assert rows.size == 9
-    assert rows["published_sd_um"][0] == 0.184
-    assert rows["obtained_sd_um"][0] == pytest.approx(0.184, rel=0.25)
-    for row in rows:
-        assert f"{row['published_mean_um']:.3f} /{row['obtained_mean_um']:>7.3f}" in printed
-
-
-@pytest.fixture
-def _no_pictures_at_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    import matplotlib.pyplot as plt
-
-    def none(figures: object, folder: object) -> list[Path]:
-        del folder
-        assert len(figures) == 10  # type: ignore[arg-type]
-        plt.close("all")
-        return []
-
-    monkeypatch.setattr("piezotrack._support.files.writing.save_figures", none)
 
 
 def rest_log(name: str = "rest.csv") -> None:
@@ -190,29 +173,25 @@ def test_noise_needs_no_drive() -> None:
 
 
 def test_what_cannot_be_done_is_refused_in_one_sentence() -> None:
-    assert "--path and --table-2: expected one of them, neither" in refusal("contour", "dahl.json")
-    assert "both are" in refusal("contour", "--table-2", "--path", "circle:0.1Hz,10um")
-    assert "--unstable has no effect with --table-2" in refusal(
-        "contour", "--table-2", "--unstable"
-    )
-    assert "neither a file nor a known kind" in refusal("contour", "--path", "square:1Hz")
-    assert "--beyond-reach" in refusal("contour", "dahl.json", "--path", "circle:0.1Hz,80um")
-    assert "LOW:HIGH" in refusal("contour", "--path", "circle:0.1Hz,1um", "--cross-talk", "3")
-    assert "lag is -1" in refusal("contour", "--path", "circle:0.1Hz,1um", "--lag", "-1")
+    assert refusal("contour", "dahl.json").startswith("PATH is missing")
+    assert "neither a file nor a known kind" in refusal("contour", "square:1Hz")
+    assert "--beyond-reach" in refusal("contour", "dahl.json", "circle:0.1Hz,80um")
+    assert "XY:YX" in refusal("contour", "circle:0.1Hz,1um", "--cross-talk", "3")
+    assert "lag is -1" in refusal("contour", "circle:0.1Hz,1um", "--lag", "-1")
     assert "x: the loop is unstable" in refusal(
-        "contour", "dahl.json", "--path", "circle:0.1Hz,1um", "--kp", "0.9", *PAPER
+        "contour", "dahl.json", "circle:0.1Hz,1um", "--kp", "0.9", *PAPER
     )
-    assert "3 model files are given: expected two at most" in refusal(
-        "contour", *("dahl.json",) * 3, "--path", "circle:0.1Hz,1um"
+    assert "3 files are given: expected two at most" in refusal(
+        "contour", *("dahl.json",) * 3, "circle:0.1Hz,1um"
     )
     assert "expected one model file with --stage xu-li-2010" in refusal(
-        "contour", "dahl.json", "dahl.json", "--path", "circle:0.1Hz,1um", *PAPER
+        "contour", "dahl.json", "dahl.json", "circle:0.1Hz,1um", *PAPER
     )
     assert "--stage is dahl.json without MODEL_X" in refusal(
-        "contour", "--path", "circle:0.1Hz,1um", "--stage", "dahl.json"
+        "contour", "circle:0.1Hz,1um", "--stage", "dahl.json"
     )
     assert "expected one model file, or that of x and of y, or xu-li-2010" in refusal(
-        "contour", "dahl.json", "--path", "circle:0.1Hz,1um", *PAPER, "--stage", "dahl.json"
+        "contour", "dahl.json", "circle:0.1Hz,1um", *PAPER, "--stage", "dahl.json"
     )
     Path("still.csv").write_text(
         "time_s,x_um\n" + "\n".join(f"{k / 100},1.0" for k in range(200)), encoding="utf-8"
@@ -230,10 +209,10 @@ def test_a_path_of_two_columns_needs_an_interval() -> None:
     t = np.arange(201) / 20.0
     rows = np.column_stack([50.0 + 10.0 * np.cos(t), 50.0 + 10.0 * np.sin(t)])
     np.savetxt("path.csv", rows, delimiter=",", header="x_um,y_um", comments="", fmt="%.4f")
-    words = refusal("contour", "dahl.json", "--path", "path.csv")
+    words = refusal("contour", "dahl.json", "path.csv")
     assert words.startswith("path.csv:1: no column is known to be the time: expected time_s")
-    assert "--path-dt" in words
-    printed = ran("contour", "dahl.json", "--path", "path.csv", "--path-dt", "0.05", *PAPER)
+    assert "--dt" in words
+    options = ("--dt", "50ms", *PAPER, "--no-feedback")
+    printed = ran("contour", "dahl.json", "path.csv", *options)
     assert "XYReference(path.csv, 40 to 60 by 40 to 60 um, 10" in printed
     assert "note  the path begins 78 um from the stage" in printed
-    assert "expected none" in refusal("contour", "--path", "circle:1Hz,10um", "--path-dt", "0.05")

@@ -48,7 +48,7 @@ def test_the_c_of_a_file_is_that_of_the_controller() -> None:
 def test_a_table_beyond_the_limits_is_told() -> None:
     """At 5 um the settled loop of this stage needs less than 0 V."""
     controller = save(feedforward=PLAYS.inverse(), limits=(5.0, 75.0))
-    low = ("--reference", "sine:0.5Hz,5..60um,4s", "--to", "json", "--json", "--out")
+    low = ("sine:0.5Hz,5..60um,4s", "--to", "json", "--json", "--out")
     note = json.loads(ran("export", "loop.json", *low, "low"))["note"]
     reference = pt.sine(frequency=0.5, low=5e-6, high=60e-6, duration=4.0)
     assert controller.feedforward is not None
@@ -56,8 +56,8 @@ def test_a_table_beyond_the_limits_is_told() -> None:
     assert table.min() < 5.0
     assert f"goes from {table.min():.4g} to {table.max():.4g} V" in note
     assert f"5 to 75 V, in {np.sum(table < 5.0)} of {table.size} samples" in note
-    assert note in ran("export", "loop.json", *low[:4], "--out", "again")
-    high = ("--reference", "sine:0.5Hz,40..60um,4s", *low[2:])
+    assert note in ran("export", "loop.json", *low[:3], "--out", "again")
+    high = ("sine:0.5Hz,40..60um,4s", *low[1:])
     assert json.loads(ran("export", "loop.json", *high, "high"))["note"] == ""
 
 
@@ -66,8 +66,8 @@ def test_a_feedforward_is_played_from_a_table() -> None:
     save(feedforward=PLAYS.inverse())
     said = refusal("export", "loop.json")
     assert said.startswith("loop.json: feedforward is the inverse of a Prandtl-Ishlinskii stage")
-    assert "--reference" in said
-    motion = ("--reference", "sine:0.5Hz,5..60um,4s", "--name", "axis")
+    assert "REFERENCE" in said
+    motion = ("sine:0.5Hz,5..60um,4s", "--name", "axis")
     ran("export", "loop.json", *motion, "--out", "c")
     compiled(Path("c"), "check.c", "axis.c")
     assert checked(Path("c"))[0] == 0
@@ -88,7 +88,7 @@ def test_what_was_learnt_is_played() -> None:
     assert checked(Path("c99"))[0] == 0
     document = json.loads(Path("json/loop.json").read_text(encoding="utf-8"))
     assert document["feedforward_table_V"] == volts
-    both = ("--table", "line.csv", "--reference", "sine:0.5Hz,5..60um,4s")
+    both = ("--table", "line.csv", "sine:0.5Hz,5..60um,4s")
     assert "expected one of them" in refusal("export", "loop.json", *both, "--out", "no")
     Path("fast.csv").write_text("time_s,voltage_V\n0,1\n0.001,2\n0.002,1\n")
     said = refusal("export", "loop.json", "--table", "fast.csv", "--out", "no")

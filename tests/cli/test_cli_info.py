@@ -10,6 +10,7 @@ import pytest
 
 import piezotrack as pt
 from commands import log_text, ran, refusal, run, write, write_model
+from piezotrack.cli.options import WINDOW
 
 ENDINGS = ["csv", "npz", "mat", "parquet"]
 
@@ -162,15 +163,22 @@ def test_a_model_is_not_taken_for_a_log() -> None:
 
 
 def test_a_window_may_have_its_unit() -> None:
-    from piezotrack.cli.options import seconds
-
-    assert seconds("--window", "1s:2500ms") == (1.0, 2.5)
-    assert seconds("--window", "1:") == (1.0, None)
+    assert WINDOW.parse("--window", "1s:2500ms") == (1.0, 2.5)
+    assert WINDOW.parse("--window", "3:15s") == (3.0, 15.0)
+    assert WINDOW.parse("--window", "300:1500ms") == (0.3, 1.5)
+    assert WINDOW.parse("--window", "1:") == (1.0, None)
     for wrong in ("1V:2", "s:2", "1e:2"):
         with pytest.raises(pt.ParameterError, match="--window has"):
-            seconds("--window", wrong)
+            WINDOW.parse("--window", wrong)
 
 
-def test_a_campaign_takes_a_window_of_each_log_and_no_more() -> None:
-    said = refusal("campaign", "log.csv", "--window", "1:2", "--window", "2:3")
-    assert "--window is given 2 times with 1 log" in said
+@pytest.mark.usefixtures("_no_pictures")
+def test_a_campaign_takes_all_windows_and_cuts_others() -> None:
+    plays = ("--model", "prandtl-ishlinskii", "--plays", "3", "--json", "--out")
+    windows = ("--window", "0:2", "--window", "2s:4s")
+    for options, folder in ((windows, "two"), (("--every", "2s"), "cut")):
+        document = json.loads(ran("campaign", "log.csv", *options, *plays, folder))
+        spans = [one["record"] for one in document["results"]]
+        assert len(spans) == 2
+        assert [span.split(" to ")[0] for span in spans] == ["log.csv 0", "log.csv 2"]
+    assert "--every is 9 s" in refusal("campaign", "log.csv", "--every", "9s")

@@ -25,11 +25,11 @@ pytestmark = pytest.mark.skipif(
 # Its sensors are noisy: another seed gives another result.
 OF_THE_PAPER = ("--stage", "xu-li-2010")
 WORK = {
-    "track": ["track", "dahl.json", "--reference", "sine:0.5Hz,0..50um,4s", *OF_THE_PAPER],
-    "contour": ["contour", "dahl.json", "--path", "circle:1Hz,5um", *OF_THE_PAPER],
+    "track": ["track", "dahl.json", "sine:0.5Hz,0..50um,4s", *OF_THE_PAPER],
+    "contour": ["contour", "dahl.json", "circle:1Hz,5um", *OF_THE_PAPER],
     "identify": [
         *("identify", "log.csv", "--model", "dahl"),
-        *("--runs", "1", "--validate", "log.csv"),
+        *("--runs", "1", "--test", "log.csv"),
     ],
     "compare": [
         "compare",
@@ -40,20 +40,20 @@ WORK = {
         "dahl",
         "--model",
         "bouc-wen",
-        "--train",
+        "--window",
         ":3",
     ],
     "tune": [
-        *("tune", "dahl.json", "--reference", "sine:0.5Hz,10..60um,4s", "--noise-nm", "60"),
+        *("tune", "dahl.json", "sine:0.5Hz,10..60um,4s", "--noise", "60nm"),
         *("--dt", "0.02", "--limits", "0:75", "--parts", "pid"),
     ],
     "learn": [
-        *("learn", "dahl.json", "--reference", "sine:0.5Hz,10..60um,4s", "--noise-nm", "60"),
+        *("learn", "dahl.json", "sine:0.5Hz,10..60um,4s", "--noise", "60nm"),
         *("--dt", "0.02", "--limits", "0:75", "--trials", "3", "--picture"),
     ],
     "compare-controllers": [
         *("compare-controllers", "dahl.json", "--controllers", "PID", "--rates", "0.5,1,2"),
-        *("--dt", "0.02", "--limits", "0:75", "--noise-nm", "60"),
+        *("--dt", "0.02", "--limits", "0:75", "--noise", "60nm"),
     ],
     # Each seed is a controller of its own.
     "export": ["export", "SEED.json", "--name", "axis"],

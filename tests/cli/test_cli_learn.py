@@ -13,9 +13,9 @@ import pytest
 import piezotrack as pt
 from commands import names, ran, refusal, run, table
 
-REFERENCE = ("--reference", "sine:5Hz,10..50um,1s")
+REFERENCE = ("sine:5Hz,10..50um,1s",)
 LEARN = ("learn", "model.json", *REFERENCE, "--dt", "0.001", "--limits", "0:75")
-REAL = ("--stage", "stage.json", "--noise-nm", "5", "--mode-scales", "0.97,1,1.03")
+REAL = ("--stage", "stage.json", "--noise", "5nm", "--mode-scales", "0.97,1,1.03")
 
 
 def plays(gain: float = 1.0) -> pt.PrandtlIshlinskiiStage:
@@ -78,7 +78,7 @@ def test_the_convergence_is_said_before_the_first_table_and_the_errors_of_each_t
     assert all(after < 0.6 * before for before, after in pairwise(errors[:4]))
     assert lines[9] == "ended: all trials were made"
     assert lines[10] == f"best: trial 5, {errors[5]:.4g} nm rms after {errors[0]:.4g} nm"
-    assert lines[-1] == "  learnt.csv"
+    assert lines[-1] == "written: learnt.csv"
 
 
 def test_the_json_document_has_the_convergence_and_all_trials() -> None:
@@ -101,18 +101,18 @@ def test_the_json_document_has_the_convergence_and_all_trials() -> None:
     assert ran(*LEARN, *REAL, "--quiet", "--trials", "2", "--overwrite") == ""
 
 
-def test_the_picture_is_beside_the_table_and_results_are_kept() -> None:
-    ran(*LEARN, *REAL, "--trials", "2", "-o", "out/one.csv", "--picture")
-    assert names("out") == ["one.csv", "one.png", "one.svg"]
-    before = Path("out/one.csv").read_bytes()
-    Path("out/two.png").write_text("mine", encoding="utf-8")
-    again = (*LEARN, *REAL, "--trials", "3", "--picture", "-o")
-    assert "one.csv exists: expected --overwrite" in refusal(*again, "out/one.csv")
-    assert "two.png exists: expected --overwrite" in refusal(*again, "out/two.csv")
-    assert names("out") == ["one.csv", "one.png", "one.svg", "two.png"]
-    assert Path("out/one.csv").read_bytes() == before
-    ran(*again, "out/one.csv", "--overwrite")
-    assert Path("out/one.csv").read_bytes() != before
+def test_a_folder_has_a_picture_too_and_results_are_kept() -> None:
+    ran(*LEARN, *REAL, "--trials", "2", "-o", "out")
+    assert names("out") == ["learnt.csv", "learnt.png", "learnt.svg"]
+    before = Path("out/learnt.csv").read_bytes()
+    again = (*LEARN, *REAL, "--trials", "3", "-o")
+    assert "learnt.csv exists: expected --overwrite" in refusal(*again, "out")
+    assert Path("out/learnt.csv").read_bytes() == before
+    ran(*again, "out", "--overwrite")
+    assert Path("out/learnt.csv").read_bytes() != before
+    # The picture alone.
+    ran(*again, "other/run.svg")
+    assert names("other") == ["run.svg"]
 
 
 @pytest.mark.usefixtures("_no_pictures")
@@ -130,8 +130,8 @@ def test_feedback_and_the_lifted_method() -> None:
     first = [float(line.split()[1]) for line in with_feedback.splitlines() if line[:6] == "    0 "]
     assert first[0] < 3000.0
     # A model with hysteresis does not come back to 0 um at 0 V.
-    reference = ("--reference", "triangle:5Hz,0..40um,0.4s", "--beyond-reach")
-    lifted = ("learn", "model.json", *reference, *LEARN[4:], *REAL, "--method", "lifted")
+    reference = ("triangle:5Hz,0..40um,0.4s", "--beyond-reach")
+    lifted = ("learn", "model.json", *reference, *LEARN[3:], *REAL, "--from-rest")
     lines = ran(*lifted, "--trials", "4", "-o", "lifted.csv").splitlines()
     assert "whole motion from rest" in lines[0]
     errors = [float(line.split()[1]) for line in lines[3:7]]
@@ -143,8 +143,7 @@ def test_feedback_and_the_lifted_method() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ("-o table", "--out is table: expected the name of a file, as table.csv"),
-        ("-o folder.csv --overwrite", "--out is folder.csv, a folder: expected the name of a file"),
+        ("-o table.json", "--out is table.json: expected a folder, or a file ending in .csv"),
         ("-o model.json/t.csv", "model.json cannot be made a folder"),
         ("--trials 0", "trials is 0: expected 1 to 10000"),
         ("--gain 2", "gain is 2"),
@@ -153,18 +152,18 @@ def test_feedback_and_the_lifted_method() -> None:
         ("--mode-scales a,1", "--mode-scales has 'a': expected a number"),
         ("--mode-scales 1,-2", "--mode-scales is -2: expected"),
         ("--delay -1", "delay is -1: expected"),
-        ("--limits 5", "--limits has '5': expected LOW:HIGH"),
+        ("--limits 5", "--limits is '5': expected LOW:HIGH"),
         ("--dt 0", "dt is 0.0: expected"),
-        ("--seed 2", "--seed has no effect without --noise-nm"),
+        ("--seed 2", "--seed has no effect without --noise"),
         ("--td 0.1", "--td has no effect without --kp"),
         ("--kp 0.1", "--ti is missing"),
         ("--stage gone.json", "gone.json: no such file"),
-        ("--stage xu-li-2010 --noise-nm 5", "--noise-nm has no effect with --stage xu-li-2010"),
+        ("--stage xu-li-2010 --noise 5nm", "--noise has no effect with --stage xu-li-2010"),
         ("--stage metres.json", "--stage is metres.json, whose drive is in um: expected one in V"),
         ("--json --quiet", "--json and --quiet"),
-        ("--reference chirp:1..5Hz,10..50um,2s", "does not repeat: expected one that does"),
-        ("--reference chirp:1..5Hz,10..50um,2s", "or --method lifted"),
-        ("--reference sine:5Hz,10..500um,1s", "reference is 500 um"),
+        ("MOTION chirp:1..5Hz,10..50um,2s", "does not repeat: expected one that does"),
+        ("MOTION chirp:1..5Hz,10..50um,2s", "or --from-rest"),
+        ("MOTION sine:5Hz,10..500um,1s", "reference is 500 um"),
         ("--no-feedforward --cutoff 400", "learning does not converge"),
     ],
 )
@@ -172,11 +171,13 @@ def test_wrong_options_are_named_and_nothing_is_written(options: str, words: str
     Path("folder.csv").mkdir()
     write_model_of_metres()
     before = sorted(Path().rglob("*"))
-    assert words in refusal(*LEARN, *options.split())
+    typed = options.split()
+    line = [*LEARN[:2], typed[1], *LEARN[3:]] if typed[0] == "MOTION" else [*LEARN, *typed]
+    assert words in refusal(*line)
     assert sorted(Path().rglob("*")) == before
 
 
 def test_a_reference_is_required() -> None:
     result = run("learn", "model.json")
     assert result.exit_code == 2
-    assert "--reference" in result.stderr
+    assert "REFERENCE" in result.stderr

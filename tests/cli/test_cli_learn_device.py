@@ -30,7 +30,7 @@ PLAYS = pt.PrandtlIshlinskiiStage(
     frequency=160.0,
     damping_ratio=0.05,
 )
-LINE = ("--reference", "triangle:5Hz,10..50um,1s,rounding=0.2")
+LINE = ("triangle:5Hz,10..50um,1s,rounding=0.2",)
 LEARN = ("learn", "model.json", *LINE, "--dt", "0.001", "--limits", "0:75", "--cutoff", "40")
 VIRTUAL = ("--device", "virtual:stage.json")
 
@@ -77,15 +77,15 @@ def test_a_loop_that_fails_says_where_its_beginning_is(monkeypatch: pytest.Monke
             return super().exchange(volts)
 
     use(monkeypatch, Lost(pt.VirtualStage.of(PLAYS, limits=(0.0, 75.0))))
-    motion = ("--reference", "sine:0.2Hz,20..60um,20s")
+    motion = "sine:0.2Hz,20..60um,20s"
     said = refusal("track", "loop.json", "--device", "virtual:", *motion, "--out", "tk")
     assert "the connection was lost; what was tracked up to then is in tk" in said
     assert names("tk") == ["tracking.csv", "tracking.json", "tracking.png", "tracking.svg"]
 
 
 def test_a_line_of_a_raster_is_learnt_on_a_device_and_the_table_follows_it() -> None:
-    printed = ran(*LEARN, *VIRTUAL, "--trials", "6", "-o", "out/line.csv", "--picture")
-    assert names("out") == ["line.csv", "line.png", "line.svg"]
+    printed = ran(*LEARN, *VIRTUAL, "--trials", "6", "-o", "out")
+    assert names("out") == ["learnt.csv", "learnt.png", "learnt.svg"]
     assert "\nfeedforward learnt, played on virtual amplifier\n" in printed
     errors = errors_of([line for line in printed.splitlines() if line.strip()])
     assert all(after < 0.6 * before for before, after in pairwise(errors[:4]))
@@ -93,7 +93,7 @@ def test_a_line_of_a_raster_is_learnt_on_a_device_and_the_table_follows_it() -> 
     assert errors[0] > 1500.0
     assert min(errors) < 0.1 * errors[0]
     # The same table on the same stage, and no command of this package.
-    written = table("out/line.csv")
+    written = table("out/learnt.csv")
     stage = pt.identification.load("stage.json").model
     record = stage.simulate(np.tile(written["voltage_V"], 6), 1e-3, hold="zoh").x[-200:]
     left = np.sqrt(np.mean((1e-6 * written["desired_um"] - record) ** 2))
@@ -122,7 +122,7 @@ def test_the_limits_are_those_of_record_and_device_where_none_are_given(
 
 
 def test_a_controller_in_another_process_learns_the_same() -> None:
-    stage = ("--model", "stage.json", "--limits", "0:75", "--speed", "100")
+    stage = ("stage.json", "--limits", "0:75", "--speed", "100")
     with serving(*stage) as (_, address, _):
         printed = ran(*LEARN, "--device", address, "--trials", "4")
         there = pt.hardware.connect(address)
@@ -147,7 +147,7 @@ def test_a_controller_in_another_process_learns_the_same() -> None:
 def test_a_signal_leads_the_output_to_rest_and_keeps_the_table(
     number: signal.Signals, code: int, word: str
 ) -> None:
-    stage = ("--model", "stage.json", "--limits", "0:75", "--speed", "2")
+    stage = ("stage.json", "--limits", "0:75", "--speed", "2")
     with serving(*stage) as (_, address, _):
         work = [*COMMAND, *LEARN, "--device", address, "--rest", "2.5", "-o", "kept.csv"]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
@@ -204,16 +204,16 @@ def test_what_was_learnt_before_the_device_failed_is_kept(monkeypatch: pytest.Mo
 
     device = Watched(fail)
     use(monkeypatch, device)
-    done = ("--device", "virtual:", "-o", "out/line.csv", "--picture", "--quiet")
+    done = ("--device", "virtual:", "-o", "out", "--quiet")
     said = refusal(*LEARN, *done)
     assert said == (
         "the connection was lost; the best table so far, of trial 1, is in "
-        f"{Path('out', 'line.csv')}"
+        f"{Path('out', 'learnt.csv')}"
     )
     assert device.held == 0.0
-    assert names("out") == ["line.csv", "line.png", "line.svg"]
+    assert names("out") == ["learnt.csv", "learnt.png", "learnt.svg"]
     # A settled period of the second table is in the table that was played.
-    written = table("out/line.csv")["voltage_V"]
+    written = table("out/learnt.csv")["voltage_V"]
     played = device.tables[1]
     assert any(
         np.allclose(played[k : k + written.size], written, atol=1e-7)
@@ -233,7 +233,7 @@ def test_a_device_that_may_be_anywhere_is_said_although_nothing_can_be_written(
 
     device = Watched(fail)
     use(monkeypatch, device)
-    said = refusal(*LEARN, "--device", "virtual:", "-o", "out/line.csv", "--quiet")
+    said = refusal(*LEARN, "--device", "virtual:", "-o", "out/learnt.csv", "--quiet")
     assert said.startswith("the connection was lost; the output could not be led to 0 V (")
     assert "it may be anywhere in the table; what was learnt is lost: " in said
 
@@ -253,7 +253,7 @@ def test_before_the_first_trial_is_there_nothing_is_written(
     ("options", "words"),
     [
         ("--stage stage.json", "--stage has no effect with --device: expected it left out"),
-        ("--noise-nm 5", "--noise-nm has no effect with --device"),
+        ("--noise 5nm", "--noise has no effect with --device"),
         ("--bandwidth 100", "--bandwidth has no effect with --device"),
         ("--seed 2", "--seed has no effect with --device"),
         ("--kp 0.1 --ti 0.1", "--kp has no effect with --device"),
@@ -264,15 +264,18 @@ def test_before_the_first_trial_is_there_nothing_is_written(
         ("--device scpi://localhost:1?unit=um&limits=0..75V", "localhost:1 does not answer"),
         ("--limits 0:90", "limits of the controller are 0 to 90 V: expected a range within 0 to"),
         ("--dt 1e-6", "rate is 1e+06 Hz: expected 0.1 to 100000 Hz, the rates of the device"),
-        ("--reference chirp:1..5Hz,10..50um,2s", "does not repeat: expected one that does"),
-        ("--reference triangle:5Hz,10..500um,1s", "reference is 500 um"),
+        ("MOTION chirp:1..5Hz,10..50um,2s", "does not repeat: expected one that does"),
+        ("MOTION triangle:5Hz,10..500um,1s", "reference is 500 um"),
         ("--cutoff 400", "learning does not converge on Prandtl-Ishlinskii"),
         ("--out model.json/t.csv", "model.json cannot be made a folder"),
     ],
 )
 def test_what_a_device_cannot_do_is_refused_before(options: str, words: str) -> None:
     before = sorted(Path().rglob("*"))
-    said = refusal(*LEARN, *VIRTUAL, *options.split(), "--quiet")
+    typed = options.split()
+    words_of = [*LEARN[:2], typed[1], *LEARN[3:]] if typed[0] == "MOTION" else [*LEARN]
+    rest = [] if typed[0] == "MOTION" else typed
+    said = refusal(*words_of, *VIRTUAL, *rest, "--quiet")
     assert words in said
     assert sorted(Path().rglob("*")) == before
 

@@ -48,12 +48,12 @@ def test_it_serves_a_model_file() -> None:
         pt.hardware.parse_drive("decaying:1Hz,0..60V").sample(2e-3), 2e-3, hold="zoh"
     )
     pt.identify(log, "prandtl-ishlinskii").save("model.json")
-    with serving("--model", "model.json") as (_, address, rest):
+    with serving("model.json") as (_, address, rest):
         assert rest == "0 to 60 V"
         device = pt.hardware.connect(address)
         assert device.limits == (0.0, 60.0)
         device.close()
-    with serving("--model", "model.json", "--limits", "10:40") as (_, _, rest):
+    with serving("model.json", "--limits", "10:40") as (_, _, rest):
         assert rest == "10 to 40 V"
 
 
@@ -71,13 +71,13 @@ def test_it_serves_scpi_at_an_address_that_connects() -> None:
 
 def test_what_cannot_be_served_is_refused() -> None:
     write_model()
-    assert refusal("serve", "gcs", "--model", "none.json").startswith("none.json: no such file")
+    assert refusal("serve", "gcs", "none.json").startswith("none.json: no such file")
     # It was never identified from a record.
-    message = refusal("serve", "gcs", "--model", "dahl.json")
+    message = refusal("serve", "gcs", "dahl.json")
     assert message.startswith("--limits is not given, and dahl.json does not say")
     for limits in ("75:0", "0:0", "0:inf", "nan:1"):
         assert refusal("serve", "gcs", "--limits", limits).startswith("--limits ")
-    assert refusal("serve", "gcs", "--limits", "75").startswith("--limits has '75'")
+    assert refusal("serve", "gcs", "--limits", "75").startswith("--limits is '75'")
     assert refusal("serve", "gcs", "--port", "70000").startswith("--port is 70000: expected 0 to")
     for speed in ("0", "nan", "-1", "20000"):
         assert refusal("serve", "gcs", "--speed", speed).startswith(f"--speed is {speed}: expected")

@@ -14,7 +14,7 @@ from piezotrack.data.log_file import write_log
 from records import HELD
 
 DT = 4e-3
-KINDS = ("--model", "dahl", "--stiffness", "26065", "--history", "virgin", "--seed", "1")
+KINDS = ("--model", "dahl", "--fix", "stiffness=26065", "--history", "virgin", "--seed", "1")
 FIXED = tuple(part for name, value in HELD.items() for part in ("--fix", f"{name}={value}"))
 
 
@@ -38,7 +38,7 @@ def _logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_several_logs_give_one_model() -> None:
     options = ("--window", "0:3", "--window", "0.4:", "--delay", "0", "--delay", "fit")
     weights = ("--weight", "1", "--weight", "2")
-    printed = ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, *options, *weights)
+    printed = ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, *options, *weights, "-v")
     fit = pt.identify(
         [
             pt.Record(pt.read("a.csv")[0.0:3.0], delay=0.0, history="virgin"),
@@ -60,7 +60,7 @@ def test_several_logs_give_one_model() -> None:
     written = names("results")
     for panel in ("loop", "time"):
         assert {f"dahl_{panel}.png", f"dahl_{panel}_2.png"} <= set(written)
-    assert all(f"  {Path('results', name)}\n" in printed for name in written)
+    assert "written to results/: dahl.json" in printed
 
 
 @pytest.mark.slow
@@ -88,8 +88,8 @@ def test_several_logs_share_the_creep_of_a_model_that_is_searched() -> None:
 def test_a_model_of_several_logs_is_used_like_any_other() -> None:
     ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, "--delay", "0", "--delay", "0.02")
     ran("simulate", "results/dahl.json", "b.csv", "--out", "simulated.csv")
-    train = ("--train", "0:2", "--test", "2:4")
-    ran("identify", "a.csv", *KINDS, *FIXED, "--validate", "b.csv", "--out", "one")
+    train = ("--window", "0:2", "--test", "2:4")
+    ran("identify", "a.csv", *KINDS, *FIXED, "--test", "b.csv", "--out", "one")
     assert "dahl" in ran("compare", "b.csv", "--model", "results/dahl.json", *train).lower()
 
 
@@ -100,7 +100,7 @@ def test_a_model_of_several_logs_is_used_like_any_other() -> None:
         (("--delay", "0", "--delay", "0", "--delay", "0"), "--delay is given 3 times with 2 logs"),
         (("--weight", "0"), "record 1 (a.csv): --weight is 0: expected a finite number above 0"),
         (("--weight", "1", "--weight", "-1"), "record 2 (b.csv): --weight is -1"),
-        (("--history", "virgin", "--history", "old"), "record 2 (b.csv): --history is 'old'"),
+        (("--history", "virgin", "--history", "old"), "--history is 'old'"),
         (("--window", "0:1", "--window", "9:"), "b.csv: --window 9:"),
         (("--creep", "1,0"), "creep[1] is 0 s: expected a finite number above 0"),
     ],

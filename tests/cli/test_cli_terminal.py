@@ -118,7 +118,7 @@ def test_the_working_folder_may_be_gone(tmp_path: Path) -> None:
         ["identify", "\x1b[31mred\r\n.csv"],
         ["feedforward", "dahl.json", "\x1b]0;title\x07"],
         [*WORK, "--out", "\x1b[31m\N{RIGHT-TO-LEFT OVERRIDE}[red]"],
-        ["track", "dahl.json", "--reference", *WORK[2:], "--limits", "\x9b31m"],
+        ["track", "dahl.json", *WORK[2:], "--limits", "\x9b31m"],
         ["\x1b[31mred"],
         ["identify", "--\x1b[31mred"],
     ],
@@ -131,7 +131,7 @@ def test_names_do_not_steer_the_terminal(arguments: list[str]) -> None:
     if code:
         assert r"\x" in errors
     else:
-        assert r"\x1b[31m\u202e[red]/feedforward.csv" in output
+        assert r"\x1b[31m\u202e[red]/: feedforward.csv" in output
     if errors.startswith("piezotrack: "):
         assert errors.count("\n") == 1
 

@@ -15,7 +15,7 @@ import piezotrack as pt
 from commands import names, ran, refusal
 from loops import model_text
 
-COURSE = ("--reference", "sine:0.5Hz,10..60um,6s")
+COURSE = ("sine:0.5Hz,10..60um,6s",)
 QUICK = ("--dt", "0.02", "--parts", "pid")
 
 
@@ -50,7 +50,7 @@ def controller(document: dict[str, Any], **parts: Any) -> pt.Controller:
 
 
 def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> None:
-    options = ("--noise-nm", "30", "--seed", "3", "--delay", "0.002", "--parts", "pid,low-pass")
+    options = ("--noise", "30nm", "--seed", "3", "--delay", "0.002", "--parts", "pid,low-pass")
     printed = ran("tune", "dahl.json", *COURSE, "--dt", "0.02", *options)
     assert names("results") == ["controller.json", "tuned.png", "tuned.svg", "tuning.json"]
     loaded = pt.load_controller("results/controller.json")
@@ -80,7 +80,11 @@ def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> Non
     kept = {one["name"]: one["value"] for one in document["kept"]}
     worst = max(one.sensitivity for one in (margins.low, margins.middle, margins.high))
     assert kept["sensitivity"] == pytest.approx(worst)
-    for words in ("ki ", "active constraints: ", "  results/tuning.json\n"):
+    for words in (
+        "ki ",
+        "active constraints: ",
+        "written to results/: tuning.json, controller.json",
+    ):
         assert words in printed
 
 
@@ -117,8 +121,8 @@ def test_spreads_add_plants_and_margins_in_degrees_are_kept() -> None:
 
 @pytest.mark.usefixtures("_no_pictures")
 def test_several_references_and_no_feedforward() -> None:
-    slow = ("--reference", "sine:0.25Hz,10..60um,8s")
-    ran("tune", "dahl.json", *COURSE, *slow, *QUICK, "--no-feedforward", "--figure", "largest")
+    slow = "sine:0.25Hz,10..60um,8s"
+    ran("tune", "dahl.json", *COURSE, slow, *QUICK, "--no-feedforward", "--minimise", "largest")
     document = report()
     reference = pt.sine(frequency=0.25, low=10e-6, high=60e-6, duration=8.0)
     run = pt.track(pt.load("dahl.json"), controller(document), reference)
@@ -129,7 +133,7 @@ def test_several_references_and_no_feedforward() -> None:
 
 @pytest.mark.usefixtures("_no_pictures")
 def test_the_calmest_command_within_an_allowed_error() -> None:
-    ran("tune", "dahl.json", *COURSE, *QUICK, "--figure", "effort", "--allowed-um", "0.5")
+    ran("tune", "dahl.json", *COURSE, *QUICK, "--minimise", "effort", "--largest-error", "0.5um")
     (one,) = report()["references"]
     # The search leaves the samples out in which the motion settles.
     assert one["metrics"]["rms_error"] <= 1.02 * 0.5e-6
@@ -170,21 +174,24 @@ def test_the_same_command_writes_the_same_bytes() -> None:
     ("options", "words"),
     [
         ("--parts pid,magic", "parts is ['pid', 'magic']: expected some of 'pid', 'low-pass'"),
-        ("--figure best", "--figure is best: expected rms, largest or effort"),
-        ("--figure effort", "--figure is effort without --allowed-um: expected the largest"),
-        ("--figure effort --allowed-um 0", "--allowed-um is 0: expected an error above 0 um"),
-        ("--allowed-um 1e-6", "--allowed-um is 1e-06 um without a reference: expected one"),
+        ("--minimise best", "--minimise is 'best': expected one of rms, largest, effort"),
+        ("--minimise effort", "--minimise is effort without --largest-error: expected"),
+        (
+            "--minimise effort --largest-error 0um",
+            "--largest-error is 0 nm: expected an error above 0",
+        ),
+        ("--largest-error 1pm", "--largest-error is 1e-06 um without a reference: expected one"),
         ("--gain-margin 0", "--gain-margin is 0: expected dB, above 0 and below 400"),
         ("--phase-margin 180", "--phase-margin is 180: expected degrees, 0 to below 180"),
         ("--sensitivity nan", "--sensitivity is nan: expected a factor above 1"),
         ("--mode-spread 99", "--mode-spread is 99: expected per cent, 0 to below 95"),
         ("--gain-spread -3", "--gain-spread is -3: expected per cent, 0 to below 95"),
-        ("--delay-spread -1", "--delay-spread is -1: expected seconds, 0 or above"),
+        ("--delay-spread -1", "--delay-spread is -1: expected a time of 0 or above"),
         ("--delay -1", "delay is -1: expected"),
         ("--dt 0", "dt is 0.0: expected"),
-        ("--limits 5", "--limits has '5': expected LOW:HIGH"),
-        ("--reference blob", "reference 'blob' is neither a file nor a known kind"),
-        ("--reference sine:0.5Hz,10..600um,6s", "reference is 600 um at"),
+        ("--limits 5", "--limits is '5': expected LOW:HIGH"),
+        ("blob", "reference 'blob' is neither a file nor a known kind"),
+        ("sine:0.5Hz,10..600um,6s", "reference is 600 um at"),
         ("--parts notch", "parts has 'notch': expected a mode that rings"),
     ],
 )

@@ -41,11 +41,11 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 COMMANDS = [
     ("info", "log.csv"),
     ("convert", "gaps.csv", "converted.csv", "--missing", "fill"),
-    ("identify", "log.csv", "--model", "prandtl-ishlinskii", "--validate", "far.csv"),
+    ("identify", "log.csv", "--model", "prandtl-ishlinskii", "--test", "far.csv"),
     ("simulate", "model.json", "far.csv"),
     ("feedforward", "model.json", "sine:20Hz,5..60um"),
-    ("track", "model.json", "--reference", "sine:20Hz,5..60um"),
-    ("contour", "model.json", "--path", "circle:20Hz,20um"),
+    ("track", "model.json", "sine:20Hz,5..60um"),
+    ("contour", "model.json", "circle:20Hz,20um"),
 ]
 
 

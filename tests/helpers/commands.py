@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from typer import testing
+from click import testing
 
 import piezotrack as pt
 from piezotrack.cli.advice import as_options, command_at_work
@@ -34,9 +34,6 @@ HEADING = (
     "from piezotrack.cli import main"
 )
 COMMAND = [sys.executable, "-c", f"{HEADING}; main()"]
-
-# The runner builds all commands anew for each call, which takes longer than most of the calls.
-testing._get_command = cache(testing._get_command)  # type: ignore[attr-defined]
 
 
 @cache

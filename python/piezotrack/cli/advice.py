@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import re
 from contextvars import ContextVar
-from inspect import signature
-from typing import TYPE_CHECKING, Any
-
-from typer.models import OptionInfo
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    import click
 
 __all__ = ["as_options", "command_at_work"]
 
 # Arguments whose option has another name.
 OPTIONS = {
+    "rates": "frequencies",
+    "searches": "runs",
     "count": "plays",
     "dead_zones": "asymmetry",
     "factor": "decimate",
-    "largest_error": "allowed_um",
+    "goal.largest_error": "largest_error",
     "margins.gain": "gain_margin",
     "margins.phase": "phase_margin",
     "margins.sensitivity": "sensitivity",
@@ -43,6 +42,9 @@ REMEDIES = [
     (r"\bmissing='(drop|fill)'", r"--missing \1", "--missing"),
     (r"\bcreep=False", "--creep none", "--creep"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
+    (r"\bmethod='lifted'", "--from-rest", "--from-rest"),
+    (r"\bseeds(?= is\b)", "--draws", "--draws"),
+    (r"\breference=(?=,)", "REFERENCE", "--to"),
     # An option of the commands that come after `info`.
     (r"\bfit\.zeroed\(\)", "--zero", "--zero"),
     (r"\boffset=pt\.zero\(stage\)", "--zero", "--zero"),
@@ -62,7 +64,7 @@ IN_THE_HEADER = [
 # An argument in a sentence or a table, as "runs=4", "model='dahl'" or "unstable=True".
 ARGUMENT = re.compile(r"(?<![\w'(?{&,])(?<!has )(?<!--unit )(\w+)=(?!\.)(?:True\b|'([\w-]+)'|) ?")
 
-command_at_work: ContextVar[Callable[..., Any] | None] = ContextVar("_command", default=None)
+command_at_work: ContextVar[click.Command | None] = ContextVar("_command", default=None)
 
 
 def as_options(error: object) -> str:
@@ -79,12 +81,7 @@ def as_options(error: object) -> str:
         The same; what the command at work has no option for is left in Python's words.
     """
     command = command_at_work.get()
-    arguments = {} if command is None else signature(command, eval_str=True).parameters
-    known = {
-        _option(name)
-        for name, one in arguments.items()
-        if any(isinstance(info, OptionInfo) for info in getattr(one.annotation, "__metadata__", ()))
-    }
+    known = {name for one in command.params for name in one.opts} if command else set()
 
     def in_options(match: re.Match[str]) -> str:
         option = _option(match[1])

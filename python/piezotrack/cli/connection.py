@@ -1,11 +1,9 @@
-"""Options of the commands that use a device, and its connection."""
+"""Connections to devices, and what is kept of a run that a fault ends."""
 
 from __future__ import annotations
 
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from ..errors import Interrupted, PiezotrackError
 from .interruption import acknowledge_interrupt
@@ -16,23 +14,7 @@ if TYPE_CHECKING:
     from ..errors import DataError, DeviceError
     from ..hardware.device import Device
 
-__all__ = ["DeviceAddress", "Rest", "connected", "with_what_is_kept"]
-
-DeviceAddress = Annotated[
-    str,
-    typer.Option(
-        metavar="ADDRESS",
-        help="Device: gcs://HOST, scpi://HOST:PORT?unit=um&limits=0..75V, "
-        "ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V, virtual: or virtual:MODEL.json[?zero].",
-    ),
-]
-Rest = Annotated[
-    float | None,
-    typer.Option(
-        help="Voltage before and after in V; default 0, or the limit nearest to it.",
-        show_default=False,
-    ),
-]
+__all__ = ["connected", "with_what_is_kept"]
 
 
 def with_what_is_kept(

@@ -1,261 +1,166 @@
-"""``piezotrack contour``: contouring with an XY stage, or the nine circles of Table 2."""
+"""``piezotrack contour``: contouring of a path with a simulated XY stage."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from ...errors import DataError, ParameterError
-from ..error_messages import report_errors
-from ..options import (
-    Duration,
-    Jitter,
-    Json,
-    Out,
-    Overwrite,
-    Period,
-    Quiet,
-    number,
-    number_range,
-    refuse_without_effect,
-)
+from ..command import Argument, Option, command, refuse_without_effect
+from ..option_groups import Motion
 from ..output import Output
+from ..values import LOOP_TIME, PLAIN, Ranged
 from .loop_options import (
     NO_FEEDBACK,
     PAPER,
-    AmplifierBandwidth,
-    Feedback,
-    Feedforward,
-    Interval,
-    Limits,
-    Loop,
-    LoopDelay,
-    Noise,
-    Td,
-    Ti,
-    noise_metres,
-    refuse_of_other_stage,
+    BeyondReach,
+    FeedbackOptions,
+    JitterySimulation,
+    Unstable,
 )
-from .xy_stages import OwnStage, PaperStage
+from .xy_stages import ControllerStage, OwnStage, PaperStage, controllers_in
 
 if TYPE_CHECKING:
     from ...control.controller.controller import Controller
     from ...identification.experiments.cross_talk import CrossTalk
     from ...references.xy_reference import XYReference
     from ...stages.xy import XYStage
-    from ...xu_li_2010.experiments.table_2 import Published, Table2
 
 __all__ = ["contour_command"]
 
+OF_CONTROLLERS = ("dt", "rate", "limits", "feedforward", "feedback", "kp", "ti", "td", "tt")
 
-@report_errors
+
+@command()
 def contour_command(
-    context: typer.Context,
-    models: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="[MODEL_X [MODEL_Y]]",
-            help="Model files in JSON of x and y, or one for both. Without any, the virtual stage "
-            "of the paper is simulated, with a model identified from a log of its x axis.",
+    files: Annotated[
+        list[str],
+        Argument(
+            "Model or controller files of x and y, one for both, or none for the stage of "
+            "Xu and Li 2010; then the path: circle:0.1Hz,10um, lissajous:, raster:, spiral:, or a "
+            "CSV file with x and y, centred in the workspace by default",
+            "[MODEL_X|CONTROLLER_X [MODEL_Y|CONTROLLER_Y]] PATH",
         ),
-    ] = None,
-    path: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TEXT|FILE",
-            help="Path: circle:0.1Hz,10um, lissajous:, raster:, spiral:, or a CSV file with x and "
-            "y. Its centre is by default the middle of the workspace.",
-        ),
-    ] = None,
-    table_2: Annotated[
-        bool, typer.Option("--table-2", help="The nine circles of Table 2 of Xu and Li 2010.")
-    ] = False,
+    ],
     stage: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
+            f"Stage to simulate: another model file, or {PAPER}; repeated: of x and of y; default "
+            "the models themselves",
             metavar=f"FILE|{PAPER}",
-            help=f"Stage to simulate: another model file, given twice for x and y, or {PAPER}. "
-            "Default the models themselves.",
-            show_default=False,
         ),
     ] = None,
-    out: Out = Path("results"),
-    overwrite: Overwrite = False,
     lag: Annotated[
         float | None,
-        typer.Option(
-            help=f"Time in s from sampling x to sampling y; default 0, of {PAPER} 0.01.",
-            show_default=False,
-        ),
+        Option(f"Time from sampling x to sampling y; default 0, of {PAPER} 10ms", LOOP_TIME),
     ] = None,
     cross_talk: Annotated[
-        str | None,
-        typer.Option(
-            metavar="XY:YX",
-            help=f"Cross-talk: share of y in x and of x in y; default none, of {PAPER} 0.015:0.01.",
-            show_default=False,
+        tuple[float, float] | None,
+        Option(
+            f"Share of y in x and of x in y; default none, of {PAPER} 0.015:0.01",
+            Ranged(PLAIN, "XY:YX"),
         ),
     ] = None,
     decouple: Annotated[
-        bool,
-        typer.Option("--decouple", help="Identify the cross-talk and decouple the feedforward."),
+        bool, Option("Identify the cross-talk and decouple the feedforward")
     ] = False,
-    dt: Interval = None,
-    limits: Limits = None,
-    feedforward: Feedforward = True,
-    feedback: Feedback = None,
-    kp: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KP|KX,KY",
-            help=f"Proportional gain of the PID in V/um, or one for each axis; on {PAPER} 0.12.",
-            show_default=False,
-        ),
-    ] = None,
-    ti: Ti = None,
-    td: Td = None,
-    delay: LoopDelay = 0.0,
-    jitter: Jitter = 0.0,
-    noise_nm: Noise = 0.0,
-    bandwidth: AmplifierBandwidth = math.inf,
-    duration: Duration = None,
-    period: Period = None,
-    path_dt: Annotated[
-        float | None, typer.Option(help="Sampling interval in s of a path file without times.")
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Random seed of the noise of both sensors.")] = 1,
-    beyond_reach: Annotated[
-        bool, typer.Option("--beyond-reach", help="Allow a path beyond the reach of the stage.")
-    ] = False,
-    unstable: Annotated[
-        bool,
-        typer.Option("--unstable", help="Simulate although a loop is unstable for small motions."),
-    ] = False,
-    json: Json = False,
-    quiet: Quiet = False,
+    beyond_reach: BeyondReach = False,
+    unstable: Unstable = False,
+    *,
+    motion: Motion,
+    loop: FeedbackOptions,
+    simulation: JitterySimulation,
+    output: Output,
 ) -> None:
     """Simulate contouring of a path with an XY stage."""
+    from ..._support.files.writing import picture_files
     from ...control.loop.contouring import contour
-    from ...control.timing import Timing
-    from ...xu_li_2010.experiments.table_2 import run_table_2
 
-    of_model = _is_own(stage, models, table_2)
-    gains = _gains(kp)
-    loop = Loop(of_model, dt, limits, feedback, gains[0], ti, td)
-    loop.check(context)
-    refuse_of_other_stage(context, of_model)
-    if of_model and not (noise_nm or jitter):
-        refuse_without_effect(context, ["seed"], "without --noise-nm or --jitter")
-    _check(context, models, path, table_2, feedforward, of_model)
-    both = loop, replace(loop, kp=gains[1])
-    xy = OwnStage(models, both, stage) if of_model else PaperStage(models, loop, seed)
-    plant = _changed(xy.stage(noise_metres(noise_nm), bandwidth, seed), lag, cross_talk)
-    desired = None if path is None else _path(path, duration, period, path_dt, xy.place(plant))
-    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    result.will_write(_names(table_2))
-    loops = xy.controllers(desired, feedforward)
-    how = xy.words if feedforward else "no feedforward"
-    mixing: dict[str, Any] = {"timing": Timing(delay=delay, jitter=jitter)}
+    *models, path = files
+    if path.endswith(".json"):
+        raise ParameterError("PATH", "missing", "a path, as circle:1Hz,10um, after the files")
+    if len(models) > 2:
+        raise ParameterError(f"{len(models)} files are given: expected two at most, of x and y")
+    own = _is_own(stage, models)
+    loop.check(own=own)
+    simulation.check(own=own)
+    if not loop.feedforward:
+        refuse_without_effect(["decouple"], "with --no-feedforward")
+        if models and not own:
+            raise ParameterError("MODEL_X", models[0], "none with --no-feedforward")
+    ready = controllers_in(models)
+    xy: ControllerStage | OwnStage | PaperStage
+    if ready is not None:
+        refuse_without_effect(OF_CONTROLLERS, "with controller files, which have their own")
+        xy = ControllerStage(ready, models, stage)
+    elif own:
+        xy = OwnStage(models, loop, stage)
+    else:
+        xy = PaperStage(models, loop, simulation.seed)
+    plant = _changed(xy.stage(simulation), lag, cross_talk)
+    desired = _path(path, motion, loop, xy.place(plant))
+    output.will_write(["contour.csv", "contour.json", *picture_files("contour")])
+    loops = xy.controllers(desired)
+    how = xy.words if loops[0].feedforward is not None else "no feedforward"
+    mixing: dict[str, Any] = {"timing": simulation.timing}
     if decouple:
         found = _cross_talk(plant, loops)
         mixing["decoupling"] = found.matrix
         how += f"\ncross-talk identified: {found}"
-    if desired is None:
-        table = run_table_2(plant, loops, **mixing)
-        written, words, document = _write_table(table, out), str(table), _table_document(table)
-    else:
-        run = contour(plant, loops, desired, **mixing, beyond_reach=beyond_reach, unstable=unstable)
-        notes = xy.notes(run)
-        entries = {"notes": [*run.notes, *notes]}
-        words = "\n".join([run.summary(), *(f"note  {note}" for note in notes)])
-        written, document = run.save(out, entries=entries), run.document() | entries
+    run = contour(plant, loops, desired, **mixing, beyond_reach=beyond_reach, unstable=unstable)
+    notes = xy.notes(run)
+    entries = {"notes": [*run.notes, *notes]}
     shares = [f"{100 * share:g} %" for share in plant.cross_talk]
     between = f"y lags by {plant.lag:g} s, {shares[0]} of y in x, {shares[1]} of x in y"
-    lines = [f"stage: {xy.name}: {between}; {how}", words]
-    if of_model and not loop.has_feedback:
+    lines = [f"stage: {xy.name}: {between}; {how}", run.summary()]
+    lines += [f"note  {note}" for note in notes]
+    if loops[0].feedback is None and own:
         lines.append(NO_FEEDBACK)
-    simulated = " and ".join(dict.fromkeys(stage)) if stage else "model" if of_model else PAPER
-    result.show("\n".join(lines), document | {"stage": simulated}, written)
+    simulated = " and ".join(dict.fromkeys(stage)) if stage else "model" if own else PAPER
+    document = run.document() | entries | {"stage": simulated}
+    output.show("\n".join(lines), document, output.write(partial(run.save, entries=entries)))
 
 
-def _gains(kp: str | None) -> tuple[float | None, float | None]:
-    """Parse one gain for both axes, or one for each."""
-    if kp is None:
-        return None, None
-    parts = [number("--kp", part) for part in kp.split(",")]
-    if len(parts) > 2:
-        raise ParameterError("--kp", f"'{kp}'", "one gain, or KX,KY")
-    return parts[0], parts[-1]
-
-
-def _is_own(stage: list[str] | None, models: list[Path] | None, table_2: bool) -> bool:
+def _is_own(stage: list[str] | None, models: list[str]) -> bool:
     """Whether stages of models are simulated."""
-    if stage in (None, [], [PAPER]):
-        return bool(models) and not stage and not table_2
+    if stage in (None, [PAPER]):
+        return bool(models) and not stage
     words = " ".join(stage)
     if PAPER in stage or len(stage) > 2:
         raise ParameterError("--stage", words, f"one model file, or that of x and of y, or {PAPER}")
-    if not models or table_2:
-        reason = "with --table-2" if table_2 else "without MODEL_X, whose inverse is to be played"
-        raise ParameterError("--stage", f"{words} {reason}", f"{PAPER}")
+    if not models:
+        raise ParameterError(
+            "--stage", f"{words} without MODEL_X, whose inverse is to be played", f"{PAPER}"
+        )
     return True
 
 
-def _check(
-    context: typer.Context,
-    models: list[Path] | None,
-    path: str | None,
-    table_2: bool,
-    feedforward: bool,
-    of_model: bool,
-) -> None:
-    """Refuse options that exclude each other."""
-    if table_2 == (path is not None):
-        given = "both are" if table_2 else "neither is"
-        raise ParameterError(f"--path and --table-2: expected one of them, {given} given")
-    if table_2:
-        of_a_path = ["duration", "period", "path_dt", "beyond_reach", "unstable"]
-        refuse_without_effect(context, of_a_path, "with --table-2")
-    if models and len(models) > 2:
-        raise ParameterError(f"{len(models)} model files are given: expected two at most, x and y")
-    if not feedforward:
-        refuse_without_effect(context, ["decouple"], "with --no-feedforward")
-        if models and not of_model:
-            raise ParameterError(
-                "MODEL_X", models[0], "none with --no-feedforward, where it has no effect"
-            )
-
-
-def _path(
-    text: str,
-    duration: float | None,
-    period: float | None,
-    dt: float | None,
-    place: dict[str, Any],
-) -> XYReference:
+def _path(text: str, motion: Motion, loop: FeedbackOptions, place: dict[str, Any]) -> XYReference:
     """Read the path from a file if the text names one, else parse the text."""
     from ...references.parse import path_of
+    from ..option_groups import interval
 
-    if dt is not None and not Path(text).is_file():
-        raise ParameterError("--path-dt", "for a path from a file", f"none with {text}")
+    options = {"duration": motion.duration, "period": motion.period, **place}
+    # A file without times has those of the controller.
+    dt = interval(loop.dt, loop.rate) if Path(text).is_file() else None
     try:
-        return path_of(text, duration=duration, period=period, dt=dt, **place)
+        return path_of(text, **options)
     except DataError as error:
-        # Here --time and --dt do not belong to the path.
+        if dt is not None and "dt=" in str(error):
+            return path_of(text, dt=dt, **options)
+        # Here --time does not belong to the path.
         words = str(error).replace("name it with time=, or give the", "expected time_s, or the")
-        raise DataError(words.replace("interval with dt=", "interval with --path-dt")) from None
+        raise DataError(words.replace("interval with dt=", "interval with --dt")) from None
 
 
-def _changed(stage: XYStage, lag: float | None, cross_talk: str | None) -> XYStage:
+def _changed(stage: XYStage, lag: float | None, cross_talk: tuple[float, float] | None) -> XYStage:
     """Change the stage as the options say."""
     if lag is not None:
         stage = replace(stage, lag=lag)
     if cross_talk is not None:
-        stage = replace(stage, cross_talk=number_range("--cross-talk", cross_talk))
+        stage = replace(stage, cross_talk=cross_talk)
     return stage
 
 
@@ -275,64 +180,3 @@ def _cross_talk(stage: XYStage, loops: tuple[Controller, Controller]) -> CrossTa
     return identify_cross_talk(
         stage.record(slow[0], held[1], 1e-3), stage.record(held[0], slow[1], 1e-3)
     )
-
-
-def _names(table_2: bool) -> list[str]:
-    """Files that the command writes."""
-    from ..._support.files.writing import picture_files
-    from ...xu_li_2010.experiments.table_2 import PUBLISHED
-
-    if not table_2:
-        return ["contour.csv", "contour.json", *picture_files("contour")]
-    return ["table_2.csv", *picture_files("table_2", *map(_circle, PUBLISHED))]
-
-
-def _circle(case: Published) -> str:
-    return f"circle_{1e6 * case.radius:.0f}um_{case.frequency:g}Hz"
-
-
-def _table_document(table: Table2) -> dict[str, Any]:
-    """Return published and obtained contour errors, for a program."""
-    from ...xu_li_2010.experiments.table_2 import PUBLISHED
-
-    rows = [
-        {
-            "radius": {"value": case.radius, "unit": "m"},
-            "frequency": {"value": case.frequency, "unit": "Hz"},
-            "published": {
-                "peak_to_peak": case.peak_to_peak,
-                "mean_error": case.mean,
-                "sd_error": case.sd,
-            },
-            "obtained": asdict(run.metrics),
-        }
-        for case, run in zip(PUBLISHED, table.runs, strict=True)
-    ]
-    return {"unit": "errors in m", "circles": rows}
-
-
-def _write_table(table: Table2, out: Path) -> list[Path]:
-    """Write the table with published and obtained values, and the pictures."""
-    import numpy as np
-
-    from ..._support.files.writing import make_folder, result_set, save_figures, write_columns
-    from ...xu_li_2010.experiments.table_2 import PUBLISHED
-
-    columns = {
-        "radius_um": [1e6 * case.radius for case in PUBLISHED],
-        "frequency_Hz": [case.frequency for case in PUBLISHED],
-    }
-    for name, ours in (
-        ("peak_to_peak", "peak_to_peak"),
-        ("mean", "mean_error"),
-        ("sd", "sd_error"),
-    ):
-        columns[f"published_{name}_um"] = [1e6 * getattr(case, name) for case in PUBLISHED]
-        columns[f"obtained_{name}_um"] = [1e6 * getattr(run.metrics, ours) for run in table.runs]
-    arrays = {name: np.array(values) for name, values in columns.items()}
-    figures = {"table_2": table.plot()}
-    for case, run in zip(PUBLISHED, table.runs, strict=True):
-        figures[_circle(case)] = run.plot()
-    with result_set(make_folder(out)) as folder:
-        written = write_columns(folder / "table_2.csv", arrays)
-        return [written, *save_figures(figures, folder)]

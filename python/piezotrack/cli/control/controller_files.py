@@ -5,15 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...errors import ParameterError
+from ...errors import DataError, ParameterError
 from .loop_options import PAPER, check_same_drive, known_model
 
 if TYPE_CHECKING:
     from ...control.controller.controller import Controller
     from ...identification.fitted.identified_model import IdentifiedModel
     from ...stages.virtual import VirtualStage
+    from .loop_options import Simulation
 
-__all__ = ["controller_in", "stage_of_controller"]
+__all__ = ["controller_in", "only_controller", "stage_of_controller"]
 
 
 def controller_in(file: Path) -> Controller | None:
@@ -44,13 +45,37 @@ def controller_in(file: Path) -> Controller | None:
     return load_controller(file)
 
 
+def only_controller(file: Path, remedy: str) -> Controller:
+    """Load a controller; a model is refused with what to do.
+
+    Parameters
+    ----------
+    file : pathlib.Path
+        The file.
+    remedy : str
+        What makes a controller of a model, or another option, as a sentence.
+
+    Returns
+    -------
+    Controller
+        The controller.
+
+    Raises
+    ------
+    DataError
+        The file is another.
+    """
+    from ...control.controller.load import load_controller
+    from ...identification.fitted.model_file import read_content
+
+    _, document = read_content(file)
+    if isinstance(document, dict) and document.get("format") == "piezotrack-model":
+        raise DataError(f"{file} is a model file: expected a controller file; {remedy}")
+    return load_controller(file)
+
+
 def stage_of_controller(
-    controller: Controller,
-    stage: str | None,
-    *,
-    noise: float,
-    bandwidth: float,
-    seed: int,
+    controller: Controller, stage: str | None, simulation: Simulation
 ) -> tuple[VirtualStage, IdentifiedModel | None]:
     """Make the stage that a controller of a file drives.
 
@@ -61,8 +86,8 @@ def stage_of_controller(
     stage : str or None
         A model file, or the name of the stage of the paper; by default the stage that the
         feedforward inverts.
-    noise, bandwidth, seed : float, float, int
-        Noise of its sensor [m], bandwidth of its amplifier [Hz], and seed of the noise.
+    simulation : Simulation
+        Noise of its sensor, bandwidth of its amplifier, and seed of the noise.
 
     Returns
     -------
@@ -79,9 +104,9 @@ def stage_of_controller(
     from ...control.plant import plant_of_inverse
     from ...stages.virtual import VirtualStage
 
-    parts: dict[str, Any] = {"noise": noise, "bandwidth": bandwidth, "seed": seed}
+    parts: dict[str, Any] = simulation.parts
     if stage == PAPER:
-        return VirtualStage.xu_li_2010(seed=seed), None
+        return VirtualStage.xu_li_2010(seed=simulation.seed), None
     if stage is not None:
         known = known_model(Path(stage), zero=False)
         check_same_drive(known, stage, controller.drive_unit)

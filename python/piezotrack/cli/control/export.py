@@ -5,21 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
-
 from ...errors import ParameterError
-from ..error_messages import report_errors
-from ..options import (
-    Duration,
-    Json,
-    Out,
-    Overwrite,
-    Period,
-    Quiet,
-    of_file,
-    refuse_without_effect,
-)
+from ..command import Argument, Option, command, refuse_without_effect
+from ..option_groups import Motion
+from ..options import of_file
 from ..output import Output
+from .controller_files import only_controller
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,60 +21,38 @@ if TYPE_CHECKING:
 __all__ = ["export_command"]
 
 
-@report_errors
+@command()
 def export_command(
-    context: typer.Context,
     controller: Annotated[
-        Path, typer.Argument(metavar="CONTROLLER", help="Controller file in JSON.")
+        Path, Argument("Controller file in JSON, as `tune` writes it", "CONTROLLER")
     ],
-    to: Annotated[
-        Literal["c99", "library", "json", "fmu"],
-        typer.Option(
-            help="C99 without a library, C that calls libpiezotrack, coefficients in JSON, or a "
-            "co-simulation unit (FMI 2.0)."
-        ),
-    ] = "c99",
-    out: Out = Path("results"),
-    overwrite: Overwrite = False,
-    name: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Name of files and functions; default that of CONTROLLER.",
-            show_default=False,
-        ),
-    ] = None,
-    single: Annotated[
-        bool, typer.Option("--float", help="Numbers of 4 bytes in place of 8.")
-    ] = False,
     reference: Annotated[
         str | None,
-        typer.Option(
-            metavar="TEXT|FILE",
-            help="Motion that repeats, as of `track`: the feedforward is played from a table of "
-            "one period.",
-            show_default=False,
+        Argument(
+            "Motion that repeats, as of `track`: its feedforward becomes a table of one period",
+            "REFERENCE",
         ),
     ] = None,
+    to: Annotated[
+        Literal["c99", "library", "json", "fmu"],
+        Option("C99 alone, C with libpiezotrack, coefficients, or a co-simulation unit (FMI 2.0)"),
+    ] = "c99",
+    name: Annotated[
+        str | None,
+        Option("Name of files and functions; default that of CONTROLLER", metavar="NAME"),
+    ] = None,
+    single: Annotated[bool, Option("Numbers of 4 bytes in place of 8", names=("--float",))] = False,
     table: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="One period of a feedforward of your own to play, as `learn` writes it.",
-            show_default=False,
-        ),
+        Option("One period of a feedforward to play, as `learn` writes it", metavar="FILE"),
     ] = None,
-    duration: Duration = None,
-    period: Period = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    motion: Motion,
+    output: Output,
 ) -> None:
-    """Write a controller as C, coefficients or FMU."""
-    from ...control.controller.load import load_controller
+    """Write a controller as C code, coefficients or an FMU."""
     from ...export.write import export_controller, export_files
-    from ...references.parse import reference_of
 
-    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
     chosen = controller.stem.replace("-", "_") if name is None else name
     try:
         names = export_files(to, chosen)
@@ -94,18 +63,21 @@ def export_command(
     if single and to in ("json", "library"):
         raise ParameterError("--float", f"no effect with --to {to}", "it left out", verb="has")
     if reference is None:
-        refuse_without_effect(context, ("duration", "period"), "without --reference")
-    known = load_controller(controller)
-    volts = None if table is None else _table(table, known.dt, known.drive_unit)
-    motion = None
-    if reference is not None:
-        motion = reference_of(reference, duration=duration, period=period)
-    result.will_write(names)
+        refuse_without_effect(("duration", "period"), "without REFERENCE")
+    known = only_controller(controller, "`piezotrack tune` writes one of a model")
+    values = None if table is None else _table(table, known.dt, known.drive_unit)
+    desired = None if reference is None else motion.of(reference)
+    output.will_write(names)
+    done: list[Exported] = []
+
+    def save(place: Path) -> list[Path]:
+        options: dict[str, Any] = {"to": to, "name": chosen, "single": single}
+        done.append(export_controller(known, place, reference=desired, table=values, **options))
+        return list(done[0].files)
+
     with of_file(controller):
-        done = export_controller(
-            known, out, to=to, name=chosen, single=single, reference=motion, table=volts
-        )
-    result.show(f"{known!r}\n{done}", _document(done), done.files)
+        written = output.write(save)
+    output.show(f"{known!r}\n{done[0]}", _document(done[0]), written)
 
 
 def _table(file: Path, dt: float, unit: str) -> NDArray[np.float64]:

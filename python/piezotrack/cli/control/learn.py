@@ -2,49 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from ...errors import DataError, DeviceError, Interrupted, ParameterError
-from ..connection import Rest, connected, with_what_is_kept
-from ..error_messages import report_errors
-from ..options import (
-    Duration,
-    Json,
-    ModelFile,
-    Overwrite,
-    Period,
-    Quiet,
-    Zero,
-    number,
-    refuse_without_effect,
-)
+from ...errors import DataError, DeviceError, Interrupted
+from ..command import Option, command, refuse_without_effect
+from ..connection import connected, with_what_is_kept
+from ..option_groups import Motion
+from ..options import ModelFile, OnDevice, Reference, Rest, Zero, number
 from ..output import Output
+from ..values import FREQUENCY
 from .loop_options import (
     PAPER,
-    AmplifierBandwidth,
-    Feedback,
-    Feedforward,
-    Interval,
-    Kp,
-    Limits,
-    Loop,
-    LoopDelay,
-    Noise,
-    StageFile,
-    Td,
-    Ti,
+    BeyondReach,
+    FeedbackOptions,
+    LoopOptions,
+    Simulation,
+    Stage,
     known_model,
-    noise_metres,
-    refuse_of_other_stage,
-    simulated,
     unit_of,
 )
-from .track import BeyondReach
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -58,159 +37,100 @@ if TYPE_CHECKING:
 __all__ = ["learn_command"]
 
 # Options of a simulation, or of a feedback, which a table that a device plays cannot have.
-SIMULATED = ("stage", "feedback", "kp", "ti", "td", "noise_nm", "bandwidth", "seed")
+SIMULATED = ("stage", "feedback", "kp", "ti", "td", "tt", "noise", "bandwidth", "seed")
 
 
-@report_errors
+@command(out=Path("learnt.csv"))
 def learn_command(
-    context: typer.Context,
     model: ModelFile,
-    reference: Annotated[
-        str,
-        typer.Option(
-            metavar="TEXT|FILE",
-            help="Reference, as of `track`; one that repeats, or any with --method lifted.",
-        ),
-    ],
-    stage: StageFile = None,
-    device: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Device that plays the trials, as of `measure`, in the place of a simulated "
-            "stage.",
-            show_default=False,
-        ),
-    ] = None,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="TABLE.csv", help="File for the table.")
-    ] = Path("learnt.csv"),
-    picture: Annotated[
-        bool, typer.Option("--picture", help="Write a picture beside the table, PNG and SVG.")
+    reference: Reference,
+    stage: Stage = None,
+    device: OnDevice = None,
+    rest: Rest = None,
+    trials: Annotated[int, Option("Trials at most, with the first")] = 30,
+    from_rest: Annotated[
+        bool, Option("Learn the whole motion from rest; default a settled period")
     ] = False,
-    overwrite: Overwrite = False,
-    dt: Interval = None,
-    limits: Limits = None,
-    zero: Zero = False,
-    feedforward: Feedforward = True,
-    feedback: Feedback = None,
-    kp: Kp = None,
-    ti: Ti = None,
-    td: Td = None,
-    trials: Annotated[int, typer.Option(help="Trials at most, the first included.")] = 30,
-    method: Annotated[
-        Literal["frequency", "lifted"],
-        typer.Option(help="Learn a settled period, or the whole reference from rest."),
-    ] = "frequency",
-    gain: Annotated[float, typer.Option(help="Learning gain, above 0 and below 2.")] = 0.7,
+    gain: Annotated[float, Option("Learning gain, above 0 and below 2", metavar="NUMBER")] = 0.7,
     cutoff: Annotated[
         float | None,
-        typer.Option(
-            help="Frequency in Hz up to which is learnt; default the highest that converges.",
-            show_default=False,
-        ),
+        Option("Highest frequency learnt; default the highest that converges", FREQUENCY),
     ] = None,
     mode_scales: Annotated[
         str,
-        typer.Option(
-            metavar="A,B,...",
-            help="Factors on the frequencies of the model's modes with which learning converges.",
+        Option(
+            "Factors on the model's resonances with which learning converges", metavar="A,B,..."
         ),
     ] = "0.9,1,1.1",
-    delay: LoopDelay = 0.0,
-    noise_nm: Noise = 0.0,
-    bandwidth: AmplifierBandwidth = math.inf,
-    duration: Duration = None,
-    period: Period = None,
-    rest: Rest = None,
-    seed: Annotated[int, typer.Option(help="Random seed of the sensor noise.")] = 1,
+    zero: Zero = False,
     beyond_reach: BeyondReach = False,
-    json: Json = False,
-    quiet: Quiet = False,
+    *,
+    motion: Motion,
+    loop: FeedbackOptions,
+    simulation: Simulation,
+    output: Output,
 ) -> None:
-    """Learn the voltage of a repeated motion."""
+    """Learn the voltage of a repeated motion, trial by trial.
+
+    On a simulated stage or a device. A folder as --out gets a picture as well.
+    """
     from ..._support.files.writing import picture_files
     from ...control.controller.controller import Controller
     from ...control.learning.learn import learn
     from ...control.running.zero import zero as read_zero
-    from ...control.timing import Timing
-    from ...references.parse import reference_of
 
-    of_model = stage != PAPER
-    settings = Loop(of_model, dt, limits, feedback, kp, ti, td)
-    _check_options(context, settings, device, noise_nm)
-    _check_file(out)
-    known = known_model(model, zero=zero, paper=not of_model)
-    desired = reference_of(reference, duration=duration, period=period)
-    result = Output(out.parent, overwrite=overwrite, json=json, quiet=quiet)
-    result.will_write([out.name, *(picture_files(out.stem) if picture else [])])
+    own = stage != PAPER
+    if device is None:
+        refuse_without_effect(["rest"], "without --device")
+    else:
+        refuse_without_effect(SIMULATED, "with --device")
+    loop.check(own=own)
+    simulation.check(own=own)
+    known = known_model(model, zero=zero, paper=not own)
+    desired = motion.of(reference)
+    output.will_write(["learnt.csv", *picture_files("learnt")])
     plays: AbstractContextManager[VirtualStage | Device] = (
-        nullcontext(simulated(stage, known, noise_metres(noise_nm), bandwidth, seed))
-        if device is None
-        else connected(device)
+        nullcontext(simulation.stage(stage, known)) if device is None else connected(device)
     )
     try:
         with plays as plant:
-            loop = Controller(
-                dt=settings.dt(known, desired),
-                limits=_within(plant, settings, known),
-                feedforward=known.inverse() if feedforward else None,
-                feedback=settings.pid(known),
-                drive_unit=unit_of(of_model, known),
+            controller = Controller(
+                dt=loop.interval(known, desired, own=own),
+                limits=_within(plant, loop, known, own=own),
+                feedforward=known.inverse() if loop.feedforward else None,
+                feedback=loop.pid(known, own=own),
+                drive_unit=unit_of(own, known),
             )
             learning = learn(
                 plant,
                 desired,
-                loop,
+                controller,
                 model=known,
                 trials=trials,
-                method=method,
-                timing=Timing(delay=delay),
+                method="lifted" if from_rest else "frequency",
+                timing=simulation.timing,
                 gain=gain,
                 cutoff=cutoff,
                 mode_scales=[number("--mode-scales", one) for one in mode_scales.split(",")],
                 rest=rest,
                 offset=read_zero(plant, rest=rest) if zero and device is not None else None,
                 beyond_reach=beyond_reach,
-                progress=None if json or quiet else _show,
+                progress=None if output.json or output.quiet else _show,
             )
     except (DeviceError, DataError, Interrupted) as error:
-        raise with_what_is_kept(
-            error, "learnt", lambda learnt: _kept(learnt, out, picture)
-        ) from None
+        raise with_what_is_kept(error, "learnt", partial(_kept, output)) from None
     words = _outcome(learning) if device is None else f"{_outcome(learning)}\n{learning.final.note}"
-    result.show(words, learning.document(), _write(learning, out, picture))
-
-
-def _check_options(
-    context: typer.Context, settings: Loop, device: str | None, noise_nm: float
-) -> None:
-    """Refuse options without effect."""
-    if device is None:
-        refuse_without_effect(context, ["rest"], "without --device")
-    else:
-        refuse_without_effect(context, SIMULATED, "with --device")
-    settings.check(context)
-    refuse_of_other_stage(context, settings.own)
-    if settings.own and not noise_nm:
-        refuse_without_effect(context, ["seed"], "without --noise-nm")
-
-
-def _check_file(out: Path) -> None:
-    if out.suffix.lower() != ".csv":
-        raise ParameterError("--out", out, "the name of a file, as table.csv")
-    if out.is_dir():
-        raise ParameterError("--out", f"{out}, a folder", "the name of a file in it")
+    output.show(words, learning.document(), output.write(partial(_save, learning)))
 
 
 def _within(
-    plant: VirtualStage | Device, settings: Loop, known: IdentifiedModel
+    plant: VirtualStage | Device, loop: LoopOptions, known: IdentifiedModel, *, own: bool
 ) -> tuple[float, float]:
     """Return the limits of the table [V]; by default no more than those of a device."""
     from ...hardware.device import Device
 
-    low, high = settings.volts(known)
-    if settings.limits is None and isinstance(plant, Device):
+    low, high = loop.volts(known, own=own)
+    if loop.limits is None and isinstance(plant, Device):
         # A recorder may have said a little more than what can be put out.
         least, most = max(low, plant.limits[0]), min(high, plant.limits[1])
         if least < most:
@@ -218,20 +138,18 @@ def _within(
     return low, high
 
 
-def _write(learning: Learning, out: Path, picture: bool) -> list[Path]:
-    """Write the table and, where it is asked for, the picture."""
-    from ..._support.files.writing import make_folder, result_set, save_figures
+def _save(learning: Learning, place: Path) -> list[Path]:
+    """Write the table and a picture."""
+    from ..._support.files.writing import result_set, save_figures
 
-    with result_set(make_folder(out.parent)) as folder:
-        written = [learning.save(folder / out.name)]
-        if picture:
-            written += save_figures({out.stem: learning.plot()}, folder)
-    return written
+    with result_set(place) as folder:
+        table = learning.save(folder / "learnt.csv")
+        return [table, *save_figures({"learnt": learning.plot()}, folder)]
 
 
-def _kept(learnt: Learning, out: Path, picture: bool) -> str:
+def _kept(output: Output, learnt: Learning) -> str:
     """Write what was learnt before an error, and say where."""
-    table, *_ = _write(learnt, out, picture)
+    table, *_ = output.write(partial(_save, learnt))
     return f"the best table so far, of trial {learnt.best}, is in {table}"
 
 

@@ -1,23 +1,24 @@
-"""Options of the loop that ``track`` and ``contour`` share, and their defaults from a model."""
+"""Options of a control loop and of the stage that is simulated, and their defaults from a model."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import isfinite
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from ..._support.units import decibels, shown_unit
 from ...errors import ParameterError
-from ..options import number_range, refuse_without_effect
+from ..command import Option, group, refuse_without_effect
+from ..option_groups import Rate, interval
+from ..options import Bandwidth, Delay, Limits, Noise, Seed
+from ..values import GAIN, LOOP_TIME
 
 if TYPE_CHECKING:
     from ...control.laws.pid import Pid
     from ...control.loop.stability import LoopCheck
     from ...control.loop.tracking import Tracking
     from ...control.parts.repetitive import Repetitive
+    from ...control.timing import Timing
     from ...identification.fitted.identified_model import IdentifiedModel
     from ...references.reference import Reference
     from ...stages.virtual import VirtualStage
@@ -25,26 +26,20 @@ if TYPE_CHECKING:
 __all__ = [
     "NO_FEEDBACK",
     "PAPER",
-    "AmplifierBandwidth",
-    "Feedback",
-    "Feedforward",
-    "Interval",
-    "Kp",
-    "Limits",
-    "Loop",
-    "LoopDelay",
-    "Noise",
-    "StageFile",
-    "StageModel",
-    "Td",
-    "Ti",
+    "BeyondReach",
+    "FeedbackOptions",
+    "JitterySimulation",
+    "LoopOptions",
+    "Online",
+    "Simulation",
+    "Stage",
+    "Unstable",
     "check_same_drive",
     "drive_notes",
     "driven_by_voltage",
+    "gain_of",
     "known_model",
-    "noise_metres",
-    "refuse_of_other_stage",
-    "simulated",
+    "repetitive_part",
     "small_margins",
     "stage_model",
     "unit_of",
@@ -53,203 +48,192 @@ __all__ = [
 
 # Name of the stage of the paper, which can be simulated without a file.
 PAPER = "xu-li-2010"
-NO_FEEDBACK = (
-    "no feedback: give --kp in V/um and --ti in s for a PID controller; in um/um for a drive in um"
-)
+NO_FEEDBACK = "no feedback: --kp and --ti give a PID controller, as --kp 0.03V/um --ti 20ms"
 # The loop of Xu and Li 2010: sampling interval in s, limits in V, gains in V/um and s.
 PAPER_DT, PAPER_LIMITS = 0.02, (0.0, 75.0)
 PAPER_KQ, PAPER_TQ = 1.0, 0.2
 PAPER_GAINS = {"kp": 0.120, "ti": 0.009, "td": 0.044}
 
-StageFile = Annotated[
+Stage = Annotated[
     str | None,
-    typer.Option(
+    Option(
+        f"Stage to simulate: another model file, or {PAPER}, with the loop of Xu and Li 2010; "
+        "default the model itself",
         metavar=f"FILE|{PAPER}",
-        help=f"Stage to simulate: another model file, or {PAPER}. Default the model itself.",
-        show_default=False,
     ),
 ]
-StageModel = Annotated[
-    str | None,
-    typer.Option(
-        metavar="FILE",
-        help="Stage to simulate: another model file, for which the margins hold too. Default the "
-        "model itself.",
-        show_default=False,
-    ),
+Online = Annotated[
+    bool, Option("Feedforward computed at each sample; default a table of one period")
 ]
-Interval = Annotated[
-    float | None,
-    typer.Option(
-        help="Sampling interval of the controller in s; default that of a reference file, or of "
-        f"the record identified, of {PAPER} 0.02.",
-        show_default=False,
-    ),
-]
-Limits = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LOW:HIGH",
-        help="Limits of the drive in V, or in um where that is its unit; default the drive range "
-        f"of the record identified, of {PAPER} 0:75.",
-        show_default=False,
-    ),
-]
-Feedforward = Annotated[bool, typer.Option(help="Feedforward by the inverse of the model.")]
-Feedback = Annotated[
-    bool | None,
-    typer.Option(
-        help=f"PID feedback; default where --kp is given, and on {PAPER}.", show_default=False
-    ),
-]
-Kp = Annotated[
-    float | None,
-    typer.Option(
-        help=f"Proportional gain of the PID in V/um, or um/um; on {PAPER} 0.12.", show_default=False
-    ),
-]
-Ti = Annotated[
-    float | None,
-    typer.Option(help=f"Integral time of the PID in s; on {PAPER} 0.009.", show_default=False),
-]
-Td = Annotated[
-    float | None,
-    typer.Option(
-        help=f"Derivative time of the PID in s; default 0, on {PAPER} 0.044.", show_default=False
-    ),
-]
-LoopDelay = Annotated[float, typer.Option(help="Delay in the loop in s, in addition to the hold.")]
-Noise = Annotated[
-    float, typer.Option("--noise-nm", help="Noise of the simulated sensor in nm rms.")
-]
-AmplifierBandwidth = Annotated[
-    float, typer.Option("--bandwidth", help="Bandwidth of the simulated amplifier in Hz.")
-]
+BeyondReach = Annotated[bool, Option("Allow a motion that the stage cannot reach")]
+Unstable = Annotated[bool, Option("Run although the loop is unstable for small motions")]
 
 
-def noise_metres(noise_nm: float) -> float:
-    """Noise of the sensor in metres, from the option in nm.
+@group
+class LoopOptions:
+    """Loop."""
 
-    Parameters
-    ----------
-    noise_nm : float
-        Option ``--noise-nm``, nm rms.
+    dt: Annotated[
+        float | None,
+        Option("Sampling interval; default that of a reference file, or of the record", LOOP_TIME),
+    ] = None
+    rate: Rate = None
+    limits: Limits = None
 
-    Returns
-    -------
-    float
-        The same in m rms.
+    def interval(
+        self, model: IdentifiedModel | None, reference: Reference | None, *, own: bool = True
+    ) -> float:
+        """Return the sampling interval: as given, of the reference's file, or of the record [s]."""
+        known = [interval(self.dt, self.rate), None if own else PAPER_DT]
+        known += [None if reference is None else reference.interval, model.dt if model else None]
+        for one in known:
+            if one is not None:
+                return one
+        raise _missing("--dt", "the sampling interval, as 5ms, or --rate, as 200Hz")
 
-    Raises
-    ------
-    ParameterError
-        If it is negative or not finite: in nm, as it was typed.
-    """
-    if not (isfinite(noise_nm) and noise_nm >= 0.0):
-        raise ParameterError("--noise-nm", f"{noise_nm:g}", "nm rms, finite, 0 or above")
-    return 1e-9 * noise_nm
+    def volts(self, model: IdentifiedModel | None, *, own: bool = True) -> tuple[float, float]:
+        """Return the limits: as given, or the range of the model's record, in SI."""
+        if self.limits is not None:
+            unit = unit_of(own, model)
+            name, scale = shown_unit(unit)
+            for one in self.limits:
+                _check_unit("--limits", one, name)
+            low, high = (float(one) / scale for one in self.limits)
+            return low, high
+        known = model.drive_range if own and model else PAPER_LIMITS
+        if known is None:
+            raise _missing("--limits", "the limits of the drive, as 0:75V")
+        return known
 
 
-@dataclass(frozen=True)
-class Loop:
-    """The loop as the options describe it, on one's own stage or on that of the paper.
+@group
+class FeedbackOptions(LoopOptions):
+    """Loop."""
 
-    Attributes
-    ----------
-    own : bool
-        Whether the model itself is simulated.
-    interval, limits : float, str or None
-        Options ``--dt`` and ``--limits``.
-    feedback : bool or None
-        Option ``--feedback`` or ``--no-feedback``.
-    kp, ti, td, tt : float or None
-        Gains of the PID.
-    """
+    feedforward: Annotated[bool, Option("Feedforward by the inverse of the model; default yes")] = (
+        True
+    )
+    feedback: Annotated[bool | None, Option(f"PID feedback; default with --kp, and on {PAPER}")] = (
+        None
+    )
+    kp: Annotated[float | None, Option("Proportional gain of the PID, as 0.03V/um", GAIN)] = None
+    ti: Annotated[float | None, Option("Integral time of the PID, as 20ms", LOOP_TIME)] = None
+    td: Annotated[float | None, Option("Derivative time of the PID; default 0", LOOP_TIME)] = None
+    tt: Annotated[
+        float | None,
+        Option("Time of the anti-windup, inf for none; default sqrt(ti td), or ti", LOOP_TIME),
+    ] = None
 
-    own: bool
-    interval: float | None
-    limits: str | None
-    feedback: bool | None
-    kp: float | None
-    ti: float | None
-    td: float | None
-    tt: float | None = None
-
-    def check(self, context: typer.Context) -> None:
+    def check(self, *, own: bool) -> None:
         """Refuse gains of a feedback that is left out."""
-        if not self.has_feedback:
-            gains = [name for name in ("kp", "ti", "td", "tt") if name in context.params]
+        if not self.has_feedback(own=own):
             reason = "with --no-feedback" if self.feedback is False else "without --kp"
-            refuse_without_effect(context, gains, reason)
+            refuse_without_effect(("kp", "ti", "td", "tt"), reason)
 
-    @property
-    def has_feedback(self) -> bool:
+    def has_feedback(self, *, own: bool) -> bool:
         """Whether there is feedback: on one's own stage where a gain is given."""
         if self.feedback is None:
-            return not self.own or self.kp is not None
+            return not own or self.kp is not None
         return self.feedback
 
-    def pid(self, model: IdentifiedModel | None) -> Pid | None:
+    def pid(self, model: IdentifiedModel | None, *, own: bool) -> Pid | None:
         """Make the feedback; the paper's gains are for its own stage only."""
         from ...control.laws.pid import Pid
 
-        if not self.has_feedback:
+        if not self.has_feedback(own=own):
             return None
-        if not self.own:
+        if not own:
             given = {"kp": self.kp, "ti": self.ti, "td": self.td}
             gains = {key: PAPER_GAINS[key] if one is None else one for key, one in given.items()}
             return Pid.from_um(**gains, tt=self.tt)
         if self.kp is None or self.ti is None:
-            missing = "--kp" if self.kp is None else "--ti"
             raise ParameterError(
-                missing,
+                "--kp" if self.kp is None else "--ti",
                 "missing",
-                "--kp in V/um and --ti in s for feedback on this stage, or --no-feedback",
+                "--kp 0.03V/um --ti 20ms for a PID on this stage, or --no-feedback",
             )
-        return Pid(kp=self.kp * _per_um(model), ti=self.ti, td=self.td or 0.0, tt=self.tt)
+        kp = gain_of("--kp", self.kp, model)
+        return Pid(kp=kp, ti=self.ti, td=self.td or 0.0, tt=self.tt)
 
-    def dt(self, model: IdentifiedModel | None, reference: Reference | None) -> float:
-        """Return the sampling interval: as given, of the reference's file, or of the record [s]."""
-        if not self.own:
-            return PAPER_DT if self.interval is None else self.interval
-        of_file = None if reference is None else reference.interval
-        of_model = None if model is None else model.dt
-        for known in (self.interval, of_file, of_model):
-            if known is not None:
-                return known
-        raise _missing("--dt", "the sampling interval in s")
 
-    def volts(self, model: IdentifiedModel | None) -> tuple[float, float]:
-        """Return the voltage limits: as given, or the range of the model's record [V]."""
-        if self.limits is not None:
-            low, high = number_range("--limits", self.limits)
-            _, scale = shown_unit(unit_of(self.own, model))
-            return low / scale, high / scale
-        known = model.drive_range if self.own and model else PAPER_LIMITS
-        if known is None:
-            raise _missing("--limits", "the voltage limits as LOW:HIGH in V")
-        return known
+@group
+class Simulation:
+    """Simulated stage."""
 
-    def repetitive(
-        self, model: IdentifiedModel, reference: Reference, kq: float | None, tq: float | None
-    ) -> Repetitive:
-        """Make the repetitive part; on one's own stage half of an error is learnt in a period."""
-        from ...control.parts.repetitive import Repetitive
-        from ...control.plant import linearised_plants, plant_of
+    delay: Delay = 0.0
+    noise: Noise = 0.0
+    bandwidth: Bandwidth = math.inf
+    seed: Seed = 1
 
-        period = reference.period
-        if period is None:
-            raise ParameterError(f"--repetitive: the reference ({reference.name}) does not repeat")
-        if kq is None and self.own:
-            _, middle, _ = linearised_plants(plant_of(model), self.volts(model), 0.0)
-            kq = 0.5e-6 / middle.static_gain
-        elif kq is not None and self.own:
-            kq *= 1e-6 * _per_um(model)
-        return Repetitive.from_um(
-            period=period,
-            kq=PAPER_KQ if kq is None else kq,
-            tq=(period / 25.0 if self.own else PAPER_TQ) if tq is None else tq,
-        )
+    @property
+    def timing(self) -> Timing:
+        """Delay and jitter of the loop."""
+        from ...control.timing import Timing
+
+        return Timing(delay=self.delay, jitter=getattr(self, "jitter", 0.0))
+
+    @property
+    def parts(self) -> dict[str, float]:
+        """Noise of the sensor [m], bandwidth of the amplifier [Hz], and seed of the noise."""
+        if not (math.isfinite(self.noise) and self.noise >= 0.0):
+            raise ParameterError(
+                "--noise", f"{1e9 * self.noise:g} nm", "an rms value of 0 or above"
+            )
+        return {"noise": self.noise, "bandwidth": self.bandwidth, "seed": self.seed}
+
+    def check(self, *, own: bool, searched: bool = False) -> None:
+        """Refuse options of a stage that is not simulated, and a seed of no noise."""
+        if not own:
+            reason = f"with --stage {PAPER}, which has its own"
+            refuse_without_effect(("noise", "bandwidth"), reason)
+        elif not (searched or self.noise or getattr(self, "jitter", 0.0)):
+            has_jitter = " or --jitter" if hasattr(self, "jitter") else ""
+            refuse_without_effect(("seed",), f"without --noise{has_jitter}")
+
+    def stage(self, stage: str | None, known: IdentifiedModel) -> VirtualStage:
+        """Make the stage of the option ``--stage``; default that of the model."""
+        from ...stages.virtual import VirtualStage
+
+        if stage == PAPER:
+            return VirtualStage.xu_li_2010(seed=self.seed)
+        return VirtualStage.of(stage_model(stage, known), **self.parts)  # type: ignore[arg-type]
+
+
+@group
+class JitterySimulation(Simulation):
+    """Simulated stage."""
+
+    jitter: Annotated[
+        float, Option("Mean sampling jitter (truncated exponential distribution)", LOOP_TIME)
+    ] = 0.0
+
+
+def repetitive_part(
+    options: LoopOptions,
+    model: IdentifiedModel,
+    reference: Reference,
+    kq: float | None,
+    tq: float | None,
+    *,
+    own: bool,
+) -> Repetitive:
+    """Make the repetitive part; on one's own stage half of an error is learnt in a period."""
+    from ...control.parts.repetitive import Repetitive
+    from ...control.plant import linearised_plants, plant_of
+
+    period = reference.period
+    if period is None:
+        raise ParameterError(f"--repetitive: the reference ({reference.name}) does not repeat")
+    if kq is None and own:
+        _, middle, _ = linearised_plants(plant_of(model), options.volts(model), 0.0)
+        kq = 0.5e-6 / middle.static_gain
+    elif kq is not None and own:
+        kq = gain_of("--kq", kq, model) * 1e-6
+    return Repetitive.from_um(
+        period=period,
+        kq=PAPER_KQ if kq is None else kq,
+        tq=(period / 25.0 if own else PAPER_TQ) if tq is None else tq,
+    )
 
 
 def driven_by_voltage(model: IdentifiedModel, file: Path) -> IdentifiedModel:
@@ -280,10 +264,19 @@ def unit_of(own: bool, model: IdentifiedModel | None) -> str:
     return model.drive_unit if own and model is not None else "V"
 
 
-def _per_um(model: IdentifiedModel | None) -> float:
-    """Factor from a gain in V/um, or in um/um where the drive is a position, to SI."""
-    _, scale = shown_unit(unit_of(True, model))
-    return 1e6 / scale
+def gain_of(option: str, gain: float, model: IdentifiedModel | None) -> float:
+    """Convert a gain in V/um, or in um/um where the drive is a position, to SI."""
+    name, scale = shown_unit(unit_of(True, model))
+    _check_unit(option, gain, name)
+    return gain * (1e6 / scale)
+
+
+def _check_unit(option: str, value: float, drive: str) -> None:
+    """Refuse a value whose unit is not that of the drive, or per micrometre of it."""
+    unit = getattr(value, "unit", "").partition("/")[0]
+    kinds = {"V": ("V", "mV", "kV"), "um": ("um", "nm", "mm"), "N": ("N",)}
+    if unit and unit not in kinds.get(drive, (drive,)):
+        raise ParameterError(option, f"in {value.unit}", f"{drive}, the unit of the drive")  # type: ignore[attr-defined]
 
 
 def _missing(option: str, expected: str) -> ParameterError:
@@ -316,20 +309,8 @@ def drive_notes(model: IdentifiedModel, run: Tracking) -> list[str]:
     return notes
 
 
-def simulated(
-    stage: str | None, known: IdentifiedModel, noise: float, bandwidth: float, seed: int
-) -> VirtualStage:
-    """Make the stage of `StageFile`, with the noise [m] of a sensor and a bandwidth [Hz]."""
-    from ...stages.virtual import VirtualStage
-
-    if stage == PAPER:
-        return VirtualStage.xu_li_2010(seed=seed)
-    other = stage_model(stage, known)
-    return VirtualStage.of(other, noise=noise, bandwidth=bandwidth, seed=seed)
-
-
 def stage_model(stage: str | None, known: IdentifiedModel) -> IdentifiedModel:
-    """Load the model of `StageFile`, with a drive like that of the other; default that itself."""
+    """Load the model of ``--stage``, with a drive like that of the other; default that itself."""
     if stage is None:
         return known
     other = known_model(Path(stage), zero=known.zero != 0.0)
@@ -343,12 +324,4 @@ def check_same_drive(other: IdentifiedModel, stage: str, drive_unit: str) -> Non
         one, two = (shown_unit(unit)[0] for unit in (other.drive_unit, drive_unit))
         raise ParameterError(
             "--stage", f"{stage}, whose drive is in {one}", f"one in {two}, as of the model"
-        )
-
-
-def refuse_of_other_stage(context: typer.Context, own: bool) -> None:
-    """Refuse options of the stage that is not simulated."""
-    if not own:
-        refuse_without_effect(
-            context, ["noise_nm", "bandwidth"], f"with --stage {PAPER}, which has its own"
         )

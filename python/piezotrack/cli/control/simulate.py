@@ -3,48 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
+from typing import Annotated, Literal
 
 from ...errors import ParameterError
-from ..error_messages import report_errors
-from ..option_groups import Columns
-from ..options import (
-    DriveColumn,
-    HoldOption,
-    Interval,
-    Json,
-    ModelFile,
-    Out,
-    Overwrite,
-    Quiet,
-    TimeColumn,
-    Units,
-    of_file,
-)
+from ..command import Argument, Option, command
+from ..option_groups import DriveColumns
+from ..options import ModelFile, of_file
 from ..output import Output
 
 __all__ = ["simulate_command"]
 
 
-@report_errors
+@command()
 def simulate_command(
     model: ModelFile,
-    drive_file: Annotated[Path, typer.Argument(metavar="DRIVE", help="Log with time and drive.")],
-    out: Out = Path("results"),
-    overwrite: Overwrite = False,
-    time: TimeColumn = None,
-    drive: DriveColumn = None,
-    unit: Units = None,
-    dt: Interval = None,
-    hold: HoldOption = "foh",
-    json: Json = False,
-    quiet: Quiet = False,
+    log: Annotated[Path, Argument("Log with time and drive", "FILE")],
+    *,
+    columns: DriveColumns,
+    hold: Annotated[
+        Literal["foh", "zoh"], Option("Drive between samples: linear or constant")
+    ] = "foh",
+    output: Output,
 ) -> None:
-    """Simulate the response of a model to a drive."""
+    """Simulate the response of a model to the drive of a log."""
     from ..._support.files.writing import (
-        make_folder,
         picture_files,
         result_set,
         save_figures,
@@ -56,19 +38,17 @@ def simulate_command(
     from ...identification.views.plot import plot_response
 
     known = load(model)
-    columns = Columns(time=time, drive=drive, unit=unit, dt=dt)
-    log = drive_dataset(drive_file, **columns.arguments)
+    record = drive_dataset(log, **columns.arguments)
     name, scale = shown_unit(known.drive_unit)
-    if log.drive_unit != known.drive_unit and "m" in (log.drive_unit, known.drive_unit):
+    if record.drive_unit != known.drive_unit and "m" in (record.drive_unit, known.drive_unit):
         raise ParameterError(
-            f"{drive_file.name}: the drive is in {shown_unit(log.drive_unit)[0]}: expected {name}, "
+            f"{log.name}: the drive is in {shown_unit(record.drive_unit)[0]}: expected {name}, "
             f"as that of {model.name}"
         )
-    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    result.will_write(["simulated.csv", *picture_files("simulated")])
-    t, u = log.t, log.u
+    output.will_write(["simulated.csv", *picture_files("simulated")])
+    t, u = record.t, record.u
     interval = float(t[-1] - t[0]) / (t.size - 1)
-    with of_file(drive_file):
+    with of_file(log):
         at_first = known.model.equilibrium(float(u[0]))
         x = known.displacement(u, interval, hold=hold, initial=at_first)
     table = {
@@ -76,14 +56,17 @@ def simulate_command(
         f"{drive_word(known.drive_unit)}_{name}": scale * u,
         "displacement_um": 1e6 * x,
     }
-    with result_set(make_folder(out)) as folder:
-        written = [write_columns(folder / "simulated.csv", table)]
-        picture = plot_response(
-            *(t, u, x),
-            title=f"{known.model.info.title} driven by {drive_file.name}",
-            drive_unit=known.drive_unit,
-        )
-        written += save_figures({"simulated": picture}, folder)
+
+    def save(place: Path) -> list[Path]:
+        with result_set(place) as folder:
+            picture = plot_response(
+                *(t, u, x),
+                title=f"{known.model.info.title} driven by {log.name}",
+                drive_unit=known.drive_unit,
+            )
+            written = [write_columns(folder / "simulated.csv", table)]
+            return written + save_figures({"simulated": picture}, folder)
+
     remarks = known.extrapolation_notes(u, interval)
     words = (
         f"{t.size} samples from rest at {scale * u[0]:.4g} {name}, drive from "
@@ -98,4 +81,4 @@ def simulate_command(
         "notes": remarks,
     }
     notes = [f"note  {remark}" for remark in remarks]
-    result.show("\n".join([words, *notes]), document, written)
+    output.show("\n".join([words, *notes]), document, output.write(save))

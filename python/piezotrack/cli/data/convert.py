@@ -2,39 +2,38 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
 from ...errors import ParameterError
-from ..error_messages import report_errors
-from ..option_groups import LogOptions, with_groups
-from ..options import LogFile, OutFile, Overwrite, Quiet, list_files
+from ..command import Argument, command
+from ..option_groups import LogOptions
+from ..options import LogFile, Overwrite
+from ..output import Printing
 
 __all__ = ["convert_command"]
 
 
-@report_errors
-@with_groups
+@command()
 def convert_command(
     file: LogFile,
-    out: OutFile,
-    overwrite: Overwrite = False,
+    to: Annotated[Path, Argument("File to write: .csv, .npz, .mat or .parquet", "OUT")],
     *,
     reading: LogOptions,
-    quiet: Quiet = False,
+    overwrite: Overwrite = False,
+    printing: Printing,
 ) -> None:
-    """Write a log of any format as CSV, NPZ, MAT or Parquet.
+    """Write a log in another format: CSV, NPZ, MAT or Parquet.
 
-    In s, V and m, with the units in the titles: what is read from OUT is what is read from FILE,
-    to the last bit.
+    In s, V and m, with the units in the titles; every number is kept to the last bit.
     """
     from ...data.log_file import format_to_write
-    from ..output import print_words
 
-    format_to_write(out)
-    if out.exists() and not overwrite:
-        raise ParameterError(f"{out} exists: expected --overwrite, or another name")
+    format_to_write(to)
+    if to.exists() and not overwrite:
+        raise ParameterError(f"{to} exists: expected --overwrite, or another name")
     log = reading.log(file)
-    written = log.save(out)
-    if not quiet:
-        print(f"{len(log)} samples, {log.duration:.6g} s at {1.0 / log.dt:.6g} Hz")
-        for note in log.notes:
-            print_words(f"note  {note}")
-        list_files([written])
+    words = f"{len(log)} samples, {log.duration:.6g} s at {1.0 / log.dt:.6g} Hz"
+    notes = [f"note  {note}" for note in log.notes]
+    document = {"samples": len(log), "dt": {"value": log.dt, "unit": "s"}, "notes": log.notes}
+    printing.show("\n".join([words, *notes]), document, [log.save(to)])

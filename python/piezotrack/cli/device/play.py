@@ -5,20 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from ..connection import DeviceAddress, Rest, connected
+from ..command import Argument, command
+from ..connection import connected
+from ..control.controller_files import only_controller
 from ..control.loop_options import known_model
-from ..error_messages import report_errors
-from ..options import (
-    Duration,
-    Json,
-    Out,
-    Overwrite,
-    Period,
-    Quiet,
-    Zero,
-)
+from ..option_groups import Motion, Sampling
+from ..options import DeviceAddress, Reference, Rest, Zero
 from ..output import Output
 
 if TYPE_CHECKING:
@@ -28,46 +20,39 @@ if TYPE_CHECKING:
 __all__ = ["play_command"]
 
 
-@report_errors
+@command()
 def play_command(
     file: Annotated[
         Path,
-        typer.Argument(
-            metavar="CONTROLLER",
-            help="Controller file in JSON with feedforward alone; with --rate a model file, whose "
-            "inverse is played.",
+        Argument(
+            "Controller file with feedforward alone; with --rate a model file, whose inverse is "
+            "played",
+            "MODEL|CONTROLLER",
         ),
     ],
+    reference: Reference,
     device: DeviceAddress,
-    reference: Annotated[str, typer.Option(metavar="TEXT|FILE", help="Reference, as of `track`.")],
-    out: Out = Path("results"),
-    overwrite: Overwrite = False,
-    rate: Annotated[
-        float | None,
-        typer.Option(help="Sampling rate of the inverse of a model in Hz.", show_default=False),
-    ] = None,
+    *,
+    sampling: Sampling,
     zero: Zero = False,
-    duration: Duration = None,
-    period: Period = None,
     rest: Rest = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    motion: Motion,
+    output: Output,
 ) -> None:
     """Play a feedforward as a table on a device."""
     from ..._support.files.writing import picture_files
-    from ...control.controller.load import load_controller
     from ...control.on_device.playing import play
     from ...control.running.zero import zero as read_zero
-    from ...references.parse import reference_of
 
-    if rate is None:
-        forward: Controller | Inverse = load_controller(file)
+    rate = sampling.rate or (sampling.dt and 1.0 / sampling.dt)
+    forward: Controller | Inverse
+    if sampling.interval is None:
+        forward = only_controller(file, "to play the inverse of a model, give --rate, as 1kHz")
     else:
         forward = known_model(file, zero=zero).inverse()
-    desired = reference_of(reference, duration=duration, period=period)
-    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    result.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
+    desired = motion.of(reference)
+    output.will_write(["tracking.csv", "tracking.json", *picture_files("tracking")])
     with connected(device) as used:
         begun = read_zero(used, rest=rest) if zero else None
         run = play(used, forward, desired, rate=rate, rest=rest, offset=begun)
-    result.show(run.summary(), run.document(), run.save(out))
+    output.show(run.summary(), run.document(), output.write(run.save))

@@ -10,12 +10,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
-
 from ...errors import ParameterError
+from ..command import Argument, Option, command, refuse_without_effect
 from ..connection import connected
-from ..error_messages import report_errors
-from ..options import number_range, refuse_without_effect
+from ..options import Limits as LimitsOption
+from ..options import OnDevice, of_voltage
+from ..values import PLAIN
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -43,67 +43,47 @@ OTHERS = {
 }
 
 
-@report_errors
+@command()
 def serve_command(
-    context: typer.Context,
     protocol: Annotated[
         Literal["gcs", "scpi", "epics"],
-        typer.Argument(
-            metavar="PROTOCOL",
-            help="gcs: PI's command set, over TCP; scpi: a small instrument with messages as VOLT "
-            "and MEAS?; epics: records over Channel Access.",
+        Argument(
+            "gcs: PI's command set, over TCP; scpi: an instrument with messages as VOLT and MEAS?; "
+            "epics: records over Channel Access",
+            "PROTOCOL",
         ),
     ],
     model: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="MODEL", help="Model file in JSON; default the stage of Xu and Li 2010."
-        ),
+        Path | None, Argument("Model file in JSON; default the stage of Xu and Li 2010", "MODEL")
     ] = None,
-    limits: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LOW:HIGH", help="Lowest and highest voltage in V; default those of the stage."
-        ),
-    ] = None,
+    limits: LimitsOption = None,
     host: Annotated[
-        str, typer.Option(help="Address to listen at; by default only this computer reaches it.")
+        str, Option("Address to listen at; default 127.0.0.1, this computer alone", metavar="HOST")
     ] = "127.0.0.1",
     port: Annotated[
-        int | None,
-        typer.Option(help="TCP port; 0 for any free one; default 50000, of scpi 5025."),
+        int | None, Option("TCP port, 0 for any free one; default 50000, of scpi 5025")
     ] = None,
-    speed: Annotated[float, typer.Option(help="How much faster than real time it goes.")] = 1.0,
+    speed: Annotated[float, Option("Speed relative to real time", PLAIN)] = 1.0,
     abandoned: Annotated[
         Literal["runs", "stops", "rests"],
-        typer.Option(
-            help="What becomes of a wave of gcs whose client has gone: it runs on, as with a real "
-            "controller, stops where it is, or is led to rest at 0 V."
+        Option(
+            "What a wave of gcs does whose client has gone: it runs on, as with a real controller, "
+            "stops, or goes to rest at 0 V; default runs"
         ),
     ] = "runs",
     prefix: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help="First part of the names of epics' records, as LAB:STAGE."
-        ),
+        str | None, Option("First part of the names of epics records, as LAB:STAGE", metavar="NAME")
     ] = None,
-    device: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Device, as of `measure`, that epics publishes in the place of a virtual stage.",
-        ),
-    ] = None,
+    device: OnDevice = None,
 ) -> None:
-    """Serve a virtual stage as a controller.
+    """Simulate a controller over the network, or publish a device.
 
-    Software that controls a stage can test against it; epics also publishes a real device.
-
-    It prints what it serves, and goes on until Ctrl-C or SIGTERM.
+    Software that controls a stage can be tested against it. With epics --device a real device is
+    published. It runs until Ctrl-C or SIGTERM.
     """
-    refuse_without_effect(context, *OTHERS[protocol])
+    refuse_without_effect(*OTHERS[protocol])
     if device is not None:
-        refuse_without_effect(context, ("model", "limits", "speed"), "with --device")
+        refuse_without_effect(("model", "limits", "speed"), "with --device")
     if protocol == "epics":
         if prefix is None:
             raise ParameterError("--prefix", "missing", "the start of names, as LAB:STAGE")
@@ -118,12 +98,14 @@ def serve_command(
         threading.Event().wait()
 
 
-def _stage(model: Path | None, limits: str | None) -> tuple[VirtualStage, Limits | None]:
+def _stage(
+    model: Path | None, limits: tuple[float, float] | None
+) -> tuple[VirtualStage, Limits | None]:
     """Return the virtual stage of the options, with its limits [V]; None for the amplifier's."""
     from ...hardware.virtual import virtual_stage
 
     stage, known = virtual_stage(model)
-    within = known if limits is None else number_range("--limits", limits)
+    within = known if limits is None else of_voltage("--limits", limits)
     if within is None and not all(map(math.isfinite, stage.amplifier.limits)):
         raise ParameterError(
             "--limits",
@@ -171,7 +153,7 @@ def _scpi(stage: VirtualStage, limits: Limits | None, host: str, port: int, spee
 
 @contextmanager
 def _published(
-    address: str | None, model: Path | None, limits: str | None, speed: float
+    address: str | None, model: Path | None, limits: tuple[float, float] | None, speed: float
 ) -> Iterator[Device]:
     """Connect to the device of an address; without one make a virtual one of the options."""
     if address is None:

@@ -7,27 +7,21 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from ...errors import DataError, Interrupted, ParameterError
-from ..error_messages import report_errors
+from ..command import Argument, Option, command, refuse_without_effect
 from ..interruption import acknowledge_interrupt
-from ..option_groups import HeldLogOptions, with_groups
-from ..options import Json, Quiet, can_be_folder, refuse_without_effect, windowed
-from ..output import Output
+from ..option_groups import LogOptions
+from ..options import WINDOW, Threads, cut
+from ..output import Printing, can_be_folder
+from ..values import TIME
 from .fit_options import (
-    Delay,
-    Drift,
     FitOptions,
-    History,
     Kinds,
-    KindsNamed,
     MethodOptions,
+    Models,
     ParameterOptions,
-    Windows,
-    delay_asked,
-    drift_asked,
-    each_of,
+    RecordOptions,
+    Runs,
     searched,
 )
 
@@ -35,92 +29,75 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from concurrent.futures import Executor
 
+    from ...data.dataset import Dataset
+
 __all__ = ["campaign_command"]
 
 PARQUET = "campaign.parquet"
 
 
-@report_errors
-@with_groups
+@command()
 def campaign_command(
-    context: typer.Context,
-    files: Annotated[
-        list[Path], typer.Argument(metavar="FILE", help="Logs of any format, with their units.")
-    ],
-    window: Windows = None,
-    model: KindsNamed = None,
-    seeds: Annotated[
-        str,
-        typer.Option(metavar="N|A:B", help="Seeds of the random numbers: 0 to N-1, or A to B-1."),
-    ] = "1",
-    out: Annotated[
-        Path,
-        typer.Option(
-            metavar="FOLDER", help="Folder for the results; what it has is not computed again."
-        ),
-    ] = Path("campaign"),
-    workers: Annotated[
-        int | None, typer.Option(help="Tasks at a time, on this computer; default all cores.")
+    files: Annotated[list[Path], Argument("Logs: CSV, MAT, HDF5, TDMS, NPZ and others", "FILE")],
+    window: Annotated[
+        list[tuple[float | None, float | None]] | None,
+        Option("Part of each log, as 3s:15s; repeated: several records of each log", WINDOW),
     ] = None,
+    every: Annotated[
+        float | None, Option("Cut each log or window into records of this length", TIME)
+    ] = None,
+    model: Models = None,
+    seeds: Annotated[
+        str, Option("Seeds of the random numbers: 0 to N-1, or A to B-1", metavar="N|A:B")
+    ] = "1",
+    threads: Threads = None,
     dask: Annotated[
         str | None,
-        typer.Option(
-            metavar="HOST:PORT", help="Scheduler of dask.distributed; default this computer."
-        ),
+        Option("Scheduler of dask.distributed; default this computer", metavar="HOST:PORT"),
     ] = None,
-    parquet: Annotated[
-        bool, typer.Option("--parquet", help=f"Write the table to {PARQUET} too.")
-    ] = False,
+    parquet: Annotated[bool, Option(f"Write the table to {PARQUET} as well")] = False,
     *,
-    reading: HeldLogOptions,
+    reading: LogOptions,
+    sensor: RecordOptions,
+    structure: MethodOptions,
+    runs: Runs = None,
     parameters: ParameterOptions,
-    offset: Annotated[bool, typer.Option(help="Fit a constant sensor offset.")] = True,
-    delay: Delay = None,
-    drift: Drift = None,
-    history: History = None,
-    searching: MethodOptions,
-    runs: Annotated[
-        int | None,
-        typer.Option(help="Number of independent searches; default 1, of swarms 4."),
-    ] = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    out: Annotated[
+        Path,
+        Option("Folder for the results; those that it has are not computed again", metavar="PATH"),
+    ] = Path("campaign"),
+    printing: Printing,
 ) -> None:
-    """Identify models of many logs; run again for the rest."""
+    """Identify models of many logs or windows; resumed where it ended."""
     from ..._support.files.writing import save_figures
     from ...identification.campaigns.campaign import campaign
     from ...identification.campaigns.result import check_parquet
 
     kinds = Kinds.checked(model)
-    kinds.refuse_without_effect(context)
+    kinds.refuse_without_effect()
     if not any(map(searched, kinds.names)):
-        refuse_without_effect(context, ("seeds",), "with models that least squares find")
-    result = Output(out, overwrite=True, json=json, quiet=quiet)
+        refuse_without_effect(("seeds",), "with models that least squares find")
     can_be_folder(out)
     if parquet:
         check_parquet()
-    options = FitOptions(**vars(parameters), **vars(searching), runs=runs)
+    options = FitOptions(**vars(parameters), **vars(structure), runs=runs)
     options.check()
-    kinds.refuse_of_others(context)
-    of_record = {
-        "offset": offset,
-        "delay": delay_asked(delay),
-        "drift": None if drift is None else drift_asked(drift),
-        "history": history,
-    }
+    kinds.refuse_of_others(options.parameters())
+    sensor.check(1)
+    (of_record,) = sensor.of_each(1)
     models = {
         kind: {"model": kind, **of_record, **options.arguments_of(kind)} for kind in kinds.names
     }
     numbers = _seeds(seeds)
-    titles, windows = _titles(files), each_of("--window", window, len(files))
-    logs = {
-        title: windowed(reading.log(file, reading.hold), file, "--window", one)
-        for (title, file), one in zip(titles.items(), windows, strict=True)
-    }
-    with _executor(workers, dask) as executor:
+    logs: dict[str, Dataset] = {}
+    for title, file in _titles(files).items():
+        whole = reading.log(file)
+        for one in window or (None,):
+            logs |= _pieces(title, cut(whole, file, one), one, every)
+    with _executor(threads, dask) as executor:
         try:
             results = campaign(
-                logs, models, numbers, executor, folder=out, progress=result.progress
+                logs, models, numbers, executor, folder=out, progress=printing.progress
             )
         except Interrupted:
             acknowledge_interrupt()
@@ -132,7 +109,27 @@ def campaign_command(
     if len(results.failed) == len(results):
         first = results.failed[0]
         raise DataError(f"no model was found of any log; {first.record}: {first.error}")
-    result.show(results.summary(), results.document(), _few(written, json=json))
+    printing.show(results.summary(), results.document(), _few(written, json=printing.json))
+
+
+def _pieces(
+    title: str, log: Dataset, window: tuple[float | None, float | None] | None, every: float | None
+) -> dict[str, Dataset]:
+    """Name a log by its file and window, or cut it into windows of one length."""
+    begin, end = float(log.t[0]), float(log.t[-1])
+    if every is None:
+        return {title if window is None else f"{title} {begin:.6g} to {end:.6g} s": log}
+    if not 2.0 * log.dt < every <= end - begin + log.dt:
+        raise ParameterError(
+            "--every", f"{every:g} s", f"at most the length of {title}, {end - begin:.6g} s"
+        )
+    count = int((end - begin + 1.5 * log.dt) / every)
+    starts = [begin + k * every for k in range(count)]
+    # Up to the sample before the next window.
+    return {
+        f"{title} {start:.6g} to {start + every:.6g} s": log[start : start + every - 0.5 * log.dt]
+        for start in starts
+    }
 
 
 def _titles(files: list[Path]) -> dict[str, Path]:
@@ -163,20 +160,20 @@ def _few(written: list[Path], *, json: bool) -> list[Path]:
 
 
 @contextmanager
-def _executor(workers: int | None, dask: str | None) -> Iterator[Executor | None]:
+def _executor(threads: int | None, dask: str | None) -> Iterator[Executor | None]:
     """Make the executor that the options ask for; None for the usual one."""
-    if workers is not None and dask is not None:
-        raise ParameterError("--workers and --dask: expected one of them at most, both are given")
-    if workers is not None and not 1 <= workers <= 256:
-        raise ParameterError("--workers", workers, "1 to 256")
+    if threads is not None and dask is not None:
+        raise ParameterError("--threads and --dask: expected one of them at most, both are given")
+    if threads is not None and not 1 <= threads <= 256:
+        raise ParameterError("--threads", threads, "1 to 256")
     if dask is not None:
         with _cluster(dask) as client:
             yield client.get_executor()
         return
-    if workers is None:
+    if threads is None:
         yield None
         return
-    pool = ThreadPoolExecutor(workers)
+    pool = ThreadPoolExecutor(threads)
     try:
         yield pool
     finally:

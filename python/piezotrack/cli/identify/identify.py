@@ -4,34 +4,28 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from ..._support.display.progress_parts import Parts
 from ...errors import Interrupted, ParameterError
-from ..error_messages import report_errors
+from ..command import Option, command
 from ..interruption import acknowledge_interrupt
-from ..option_groups import HeldLogOptions, with_groups
-from ..options import Json, Out, Overwrite, Quiet, Seconds, command_line, of_file, windowed
+from ..option_groups import LogOptions
+from ..options import TestLog, TestWindow, Threads, Windows, command_line, cut, of_file
 from ..output import Output
 from .fit_options import (
     AUTO,
-    Delays,
-    Drifts,
     FitOptions,
-    Histories,
     Kinds,
-    KindsNamed,
     LogFiles,
     MethodOptions,
+    Models,
     ParameterOptions,
-    Weights,
-    Windows,
-    check_each_log,
+    RecordOptions,
+    Runs,
     each_of,
-    of_each_log,
     searched,
 )
 
@@ -43,87 +37,73 @@ if TYPE_CHECKING:
     from ...identification.fitted.score import Score
     from ...identification.problem.records import Record
 
-__all__ = ["identify_command"]
+__all__ = ["head_of", "identify_command"]
 
-# Pictures of a second log.
+# Pictures of a test.
 PANELS = ("loop", "time")
 
 
-@report_errors
-@with_groups
+@command()
 def identify_command(
-    context: typer.Context,
     files: LogFiles,
     window: Windows = None,
-    weight: Weights = None,
-    model: KindsNamed = None,
-    out: Out = Path("results"),
-    overwrite: Overwrite = False,
+    model: Models = None,
+    test: TestLog = None,
+    test_window: TestWindow = None,
     *,
-    reading: HeldLogOptions,
-    parameters: ParameterOptions,
-    offset: Annotated[bool, typer.Option(help="Fit a constant sensor offset.")] = True,
-    delay: Delays = None,
-    drift: Drifts = None,
-    history: Histories = None,
-    searching: MethodOptions,
-    seed: Annotated[int | None, typer.Option(help="Seed of the random numbers; default 0.")] = None,
-    runs: Annotated[
-        int | None,
-        typer.Option(help="Number of independent searches; default 1, of swarms 4."),
+    reading: LogOptions,
+    sensor: RecordOptions,
+    weight: Annotated[
+        list[float] | None, Option("Weight of a sample of each log; default 1", metavar="NUMBER")
     ] = None,
-    threads: Annotated[
-        int | None, typer.Option(help="Number of threads, up to 256; default all cores.")
-    ] = None,
+    structure: MethodOptions,
+    runs: Runs = None,
+    seed: Annotated[int | None, Option("Seed of the random numbers; default 0")] = None,
+    threads: Threads = None,
     checkpoint: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="Keep simulations here, to go on after an interruption; none."
-        ),
+        Option("File of simulations, to continue after an interruption", metavar="FILE"),
     ] = None,
+    parameters: ParameterOptions,
     report: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Report for other readers, .html or .pdf; default none."),
+        Path | None, Option("Report for other readers, .html or .pdf", metavar="FILE")
     ] = None,
-    validate: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Second log, for validation only; default none."),
-    ] = None,
-    validate_window: Seconds = None,
-    json: Json = False,
-    quiet: Quiet = False,
+    output: Output,
 ) -> None:
     """Identify models of a stage from one log or several."""
     from ...identification.fitted.score import share_fitted
     from ...identification.views.report_page.page import write_report
 
     kinds = Kinds.checked(model)
-    kinds.refuse_without_effect(context)
-    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    options = FitOptions(**vars(parameters), **vars(searching), seed=seed, runs=runs)
+    kinds.refuse_without_effect()
+    options = FitOptions(**vars(parameters), **vars(structure), seed=seed, runs=runs)
     options.check()
-    kinds.refuse_of_others(context)
-    check_each_log(len(files), delay=delay, drift=drift, history=history, weight=weight)
+    kinds.refuse_of_others(options.parameters())
+    sensor.check(len(files))
+    weights = each_of("--weight", weight, len(files))
+    if weight and len(files) == 1:
+        raise ParameterError("--weight", "no effect with 1 log", "it left out", verb="has")
     if checkpoint is not None and len(kinds.names) > 1:
         raise ParameterError("--checkpoint", "given with several models", "one")
+    if output.is_file and len(kinds.names) > 1:
+        raise ParameterError("--out", f"'{output.out}' with several models", "a folder")
     if report is not None:
-        _check_report(report, len(kinds.names), overwrite=overwrite)
-    if validate is None and validate_window is not None:
-        raise ParameterError("--validate-window is given without --validate")
+        _check_report(report, len(kinds.names), overwrite=output.overwrite)
+    if test is None and test_window is not None and len(files) > 1:
+        raise ParameterError(
+            "--test-window", "given with several logs and no --test", "--test FILE"
+        )
     windows = each_of("--window", window, len(files))
-    logs = [
-        windowed(reading.log(file, reading.hold), file, "--window", one)
-        for file, one in zip(files, windows, strict=True)
-    ]
+    whole = [reading.log(file) for file in files]
+    logs = [cut(*one) for one in zip(whole, files, windows, strict=True)]
     second = None
-    if validate is not None:
-        whole = reading.log(validate, reading.hold)
-        second = windowed(whole, validate, "--validate-window", validate_window)
-    records = of_each_log(
-        logs, offset=offset, delay=delay, drift=drift, history=history, weight=weight
-    )
-    result.will_write(_files(kinds, logs, options, validated=second is not None))
+    if test is not None or test_window is not None:
+        judging = whole[0] if test is None else reading.log(test)
+        second = cut(judging, test or files[0], test_window, "--test-window")
+    records = _records(logs, sensor.of_each(len(logs)), weights)
+    output.will_write(_files(kinds, logs, options, tested=second is not None))
     words: list[str] = []
+    brief: list[str] = []
     documents: list[dict[str, Any]] = []
     written: list[Path] = []
     # About how long each takes.
@@ -132,28 +112,53 @@ def identify_command(
         with nullcontext() if len(files) > 1 else of_file(files[0]), parts.begin(i):
             fit = _search(
                 records,
-                out,
+                output.folder,
                 kind,
                 **options.arguments_of(kind),
                 threads=threads,
-                progress=result.progress,
+                progress=output.progress,
                 checkpoint=checkpoint,
             )
         fit, score = _judged(fit, second)
-        written += _write(fit, out, second)
+        written += output.write(partial(_write, fit, second))
         if report is not None:
-            written.append(write_report(fit, report, command=command_line(context)))
+            written.append(write_report(fit, report, command=command_line()))
         # The result is complete: remove the file of an interrupted search.
-        (out / _partial(kind)).unlink(missing_ok=True)
-        words.append(fit.summary())
+        (output.folder / _unfinished(kind)).unlink(missing_ok=True)
+        summary = fit.summary()
+        words.append(summary)
+        brief.append(head_of(summary))
         if second is not None and score is not None:
-            refitted = ", with an offset of its own" if offset and score.fitted_share < 1.0 else ""
+            own_offset = sensor.offset and score.fitted_share < 1.0
+            refitted = ", with an offset of its own" if own_offset else ""
             span = f"from {second.t[0]:.6g} to {second.t[-1]:.6g} s"
             fitted = share_fitted(score.fitted_share)
-            words.append(f"on {second.source} {span}, {fitted}{refitted}: {score}")
-            words += [f"note  {note}" for note in score.notes]
+            tested = f"on {second.source} {span}, {fitted}{refitted}: {score}"
+            tested = "\n".join([tested, *(f"note  {note}" for note in score.notes)])
+            words.append(tested)
+            brief.append(tested)
         documents.append({**fit.document(), "notes": fit.notes})
-    result.show("\n\n".join(words), {"models": documents}, written)
+    text = "\n\n".join(words)
+    output.show(text, {"models": documents}, written, brief="\n\n".join(brief))
+
+
+def head_of(summary: str) -> str:
+    """Return the first lines of a summary and its notes, without details and parameters."""
+    first = summary.partition("\n\n")[0].split("\n")
+    return "\n".join(line for line in first if not line.startswith("      "))
+
+
+def _records(
+    logs: list[Dataset], of_each: list[dict[str, Any]], weights: list[float | None]
+) -> list[Record]:
+    """Make the records of the logs."""
+    from ...identification.problem.records import Record, label_of, of_record
+
+    records = []
+    for i, (log, options, weight) in enumerate(zip(logs, of_each, weights, strict=True)):
+        with of_record(label_of(log, i) if len(logs) > 1 else ""):
+            records.append(Record(log, weight=1.0 if weight is None else float(weight), **options))
+    return records
 
 
 def _check_report(report: Path, models: int, *, overwrite: bool) -> None:
@@ -170,7 +175,7 @@ def _check_report(report: Path, models: int, *, overwrite: bool) -> None:
 
 
 def _files(
-    kinds: Kinds, logs: list[Dataset], options: FitOptions, *, validated: bool
+    kinds: Kinds, logs: list[Dataset], options: FitOptions, *, tested: bool
 ) -> Iterator[str]:
     """Names of all files that the command may write."""
     from ..._support.files.writing import picture_files
@@ -182,11 +187,11 @@ def _files(
         names += [kind.name for kind in models_tried(logs[0], options.parameters())]
     for name in dict.fromkeys(names):
         yield from identification_files(name, searched=searched(name), records=len(logs))
-        if validated:
-            yield from picture_files(*(f"{name}_validation_{panel}" for panel in PANELS))
+        if tested:
+            yield from picture_files(*(f"{name}_test_{panel}" for panel in PANELS))
 
 
-def _partial(model: str) -> str:
+def _unfinished(model: str) -> str:
     """Name of the file that an interrupted search leaves."""
     return f"{model}.partial.json"
 
@@ -202,7 +207,7 @@ def _search(records: list[Record], out: Path, kind: str, **arguments: Any) -> Id
         acknowledge_interrupt()
         if stopped.partial is None:
             raise
-        path = stopped.partial.save(make_folder(out) / _partial(kind))
+        path = stopped.partial.save(make_folder(out) / _unfinished(kind))
         raise KeyboardInterrupt(f"{stopped}; the best so far is in {path}") from None
 
 
@@ -225,9 +230,9 @@ def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification
     return replace(fit, details={**fit.details, "validation": judged}), score
 
 
-def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]:
-    """Write the model and the pictures, those of a second log too."""
-    from ..._support.files.writing import make_folder, result_set, save_figures
+def _write(fit: Identification, second: Dataset | None, place: Path) -> list[Path]:
+    """Write the model and the pictures, those of a test too."""
+    from ..._support.files.writing import result_set, save_figures
     from ...identification.views.files import save_identification
     from ...identification.views.plot import band_of, plot_loop, plot_time, what_was_shown
 
@@ -241,10 +246,9 @@ def _write(fit: Identification, out: Path, second: Dataset | None) -> list[Path]
             plot_time(second, run, stroke=fit.stroke, half=band_of(fit, second), title=title)[0],
         )
         figures = {
-            f"{name}_validation_{panel}": one.figure
-            for panel, one in zip(PANELS, axes, strict=True)
+            f"{name}_test_{panel}": one.figure for panel, one in zip(PANELS, axes, strict=True)
         }
-    with result_set(make_folder(out)) as folder:
+    with result_set(place) as folder:
         written = save_identification(fit, folder)
         written += save_figures(figures, folder)  # type: ignore[arg-type]
     return written

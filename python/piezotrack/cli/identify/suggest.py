@@ -3,43 +3,44 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import Annotated
-
-import typer
+from typing import TYPE_CHECKING, Annotated
 
 from ...errors import ParameterError
-from ..error_messages import report_errors
-from ..options import Json, ModelFile, Out, Overwrite, Quiet, number_range, of_file
+from ..command import Option, command
+from ..option_groups import Sampling
+from ..options import ModelFile, Seed, of_file, of_voltage
 from ..output import Output
+from ..values import DRIVE, LENGTH, SLEW, TIME, Ranged
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 __all__ = ["suggest_command"]
 
 
-@report_errors
+@command()
 def suggest_command(
     model: ModelFile,
-    limits: Annotated[str, typer.Option(metavar="LOW:HIGH", help="Lowest and highest drive in V.")],
-    slew: Annotated[float, typer.Option(help="Largest rate of the drive in V/s.")],
-    seconds: Annotated[float, typer.Option(help="Length of the drive in s.")],
-    dt: Annotated[float, typer.Option(help="Sampling interval in s.")],
-    noise_nm: Annotated[
-        float | None,
-        typer.Option("--noise-nm", help="Noise of the sensor in nm rms; default the fit's rms."),
+    limits: Annotated[
+        tuple[float, float],
+        Option("Lowest and highest drive, as 0:75V", Ranged(DRIVE, "LOW:HIGH")),
+    ],
+    slew: Annotated[float, Option("Largest rate of the drive, as 2000V/s", SLEW)],
+    duration: Annotated[float, Option("Length of the drive, as 4s", TIME)],
+    *,
+    sampling: Sampling,
+    noise: Annotated[
+        float | None, Option("Noise of the sensor, rms, as 20nm; default rms of the fit", LENGTH)
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the random steps.")] = 0,
-    out: Out = Path("results"),
-    overwrite: Overwrite = False,
-    json: Json = False,
-    quiet: Quiet = False,
+    seed: Seed = 0,
+    output: Output,
 ) -> None:
     """Suggest the drive that would determine a model best.
 
-    It is written as a table that `piezotrack measure` plays, with the deviations of the parameters
-    to expect.
+    Written as a table that `piezotrack measure` plays, with the standard deviations of the
+    parameters to expect.
     """
     from ..._support.files.writing import (
-        make_folder,
         picture_files,
         result_set,
         save_figures,
@@ -48,27 +49,32 @@ def suggest_command(
     from ...identification.confidence.suggestion.suggested_drive import suggest_drive
     from ...identification.fitted.model_file import load
 
-    if noise_nm is not None and not 0.0 < noise_nm < math.inf:
-        raise ParameterError("--noise-nm", f"{noise_nm:g}", "nm rms, finite, above 0")
+    if noise is not None and not 0.0 < noise < math.inf:
+        raise ParameterError("--noise", f"{1e9 * noise:g} nm", "an rms value above 0 nm")
+    if (dt := sampling.interval) is None:
+        raise ParameterError("--dt", "missing", "a sampling interval, or a rate by --rate")
     known = load(model)
-    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    result.will_write(["suggested.csv", "suggested.json", *picture_files("suggested")])
+    output.will_write(["suggested.csv", "suggested.json", *picture_files("suggested")])
     with of_file(model):
         drive = suggest_drive(
             known,
-            limits=number_range("--limits", limits),
+            limits=of_voltage("--limits", limits),
             slew=slew,
-            seconds=seconds,
+            seconds=duration,
             dt=dt,
-            noise=None if noise_nm is None else 1e-9 * noise_nm,
+            noise=noise,
             seed=seed,
         )
-    with result_set(make_folder(out)) as folder:
-        written = [
-            drive.save(folder / "suggested.csv"),
-            write_document(folder / "suggested.json", drive.document()),
-            *save_figures({"suggested": drive.plot()}, folder),
-        ]
-    command = f"  piezotrack measure --device ADDRESS --drive {out / 'suggested.csv'} "
-    words = "\n".join([drive.summary(), "", f"{command}--rate {1.0 / dt:.9g}"])
-    result.show(words, drive.document(), written)
+
+    def save(place: Path) -> list[Path]:
+        with result_set(place) as folder:
+            return [
+                drive.save(folder / "suggested.csv"),
+                write_document(folder / "suggested.json", drive.document()),
+                *save_figures({"suggested": drive.plot()}, folder),
+            ]
+
+    written = output.write(save)
+    table = written[0] if output.is_file else output.out / "suggested.csv"
+    line = f"  piezotrack measure {table} --device ADDRESS --rate {1.0 / dt:.9g}Hz"
+    output.show("\n".join([drive.summary(), "", line]), drive.document(), written)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import click
 
-from ..error_messages import report_errors
-from ..option_groups import HeldLogOptions, with_groups
-from ..options import Json, LogFile, ModelFile, Overwrite, Quiet, Seconds, of_file, windowed
-from ..output import Output
+from ...errors import ParameterError
+from ..command import Option, command
+from ..option_groups import LogOptions
+from ..options import LogFile, ModelFile, Overwrite, Window, cut, of_file
+from ..output import Printing, can_be_folder
 
 __all__ = ["CHANGED", "watch_command"]
 
@@ -18,46 +19,43 @@ __all__ = ["CHANGED", "watch_command"]
 CHANGED = 3
 
 
-@report_errors
-@with_groups
+@command()
 def watch_command(
     model: ModelFile,
     file: LogFile,
-    window: Seconds = None,
+    window: Window = None,
     refit: Annotated[
         Path | None,
-        typer.Option(
+        Option(
+            "Identify the model again and write it here, if it is better on the last third of the "
+            "log, which is not fitted first; default not",
             metavar="FILE",
-            help="Identify the model again and write it here in JSON, if it is better on the last "
-            "third of the log, which is not fitted first; default not.",
         ),
     ] = None,
-    overwrite: Overwrite = False,
     *,
-    reading: HeldLogOptions,
-    json: Json = False,
-    quiet: Quiet = False,
+    reading: LogOptions,
+    overwrite: Overwrite = False,
+    printing: Printing,
 ) -> None:
-    """Judge from a new log whether a stage has changed.
+    """Test with a new log whether a stage has changed.
 
-    The exit code is 0 if nothing has changed as far as the log shows, 3 if something has, and 2 if
-    the log cannot be judged.
+    The exit code is 0 if the log shows no change, 3 if it does, and 2 if the log cannot be judged.
     """
     from ...identification.fitted.model_file import load
     from ...identification.watching.watch import watch
 
     known = load(model)
-    folder = Path() if refit is None else refit.parent
-    result = Output(folder, overwrite=overwrite, json=json, quiet=quiet)
     if refit is not None:
-        result.will_write([refit.name])
-    log = windowed(reading.log(file, reading.hold), file, "--window", window)
+        can_be_folder(refit.parent)
+        if refit.exists() and not overwrite:
+            raise ParameterError(f"{refit} exists: expected --overwrite, or another --refit")
+    log = cut(reading.log(file), file, window)
     with of_file(file):
         health = watch(known, log, refit=refit is not None)
     written = []
     if refit is not None and health.refit is not None and health.refit.model is not None:
         refit.parent.mkdir(parents=True, exist_ok=True)
         written = [health.refit.model.save(refit)]
-    result.show(health.summary(), health.document(), written)
+    printing.show(health.summary(), health.document(), written)
     if not health.healthy:
-        raise typer.Exit(CHANGED)
+        raise click.exceptions.Exit(CHANGED)

@@ -6,132 +6,100 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from ...errors import DataError, ParameterError
-from ..error_messages import report_errors
-from ..option_groups import Columns, with_groups
-from ..options import (
-    Decimate,
-    HoldOption,
-    Json,
-    Quiet,
-    Resample,
-    can_be_folder,
-    of_file,
-    refuse_without_effect,
-    seconds,
-    windowed,
-)
-from ..output import Output
+from ..command import Argument, Option, command, refuse_without_effect
+from ..option_groups import LogOptions
+from ..options import WINDOW, Overwrite, TestWindow, Window, cut, of_file
+from ..output import Printing, can_be_folder
 
 if TYPE_CHECKING:
     from ...benchmarking.record import BenchmarkRecord
     from ...data.dataset import Dataset
 
+    Part = tuple[float | None, float | None] | None
+
 __all__ = ["benchmark_command"]
 
 # What a line of a list may say of its log.
-SAID = ("train", "test", "other", "other-test")
+ENTRIES = ("window", "test-window", "other", "other-window")
 
 
-@report_errors
-@with_groups
+@command()
 def benchmark_command(
-    context: typer.Context,
     files: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="[FILE]", help="Your own logs, in place of the package's records."),
+        list[Path] | None, Argument("Logs, in place of the records of the package", "FILE")
     ] = None,
     listed: Annotated[
         Path | None,
-        typer.Option(
-            "--list",
+        Option(
+            "List of logs, one a line, as `log.csv window=3:23 other=second.csv`",
             metavar="FILE",
-            help="List of your own logs: a line each, as `log.csv train=3:23 other=second.csv`.",
+            names=("--list",),
         ),
     ] = None,
     record: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="Record of the package; default all. Repeatable."),
+        list[str] | None, Option("Record of the package; default all. Repeatable", metavar="NAME")
     ] = None,
     model: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME", help="Model; default all that suit a record's drive. Repeatable."
-        ),
+        Option("Name of a model; default all that suit the drive. Repeatable", metavar="NAME"),
     ] = None,
-    train: Annotated[
-        str | None,
-        typer.Option(metavar="A:B", help="Seconds of each FILE to fit; default the first half."),
-    ] = None,
-    test: Annotated[
-        str | None,
-        typer.Option(metavar="A:B", help="Seconds of each FILE to judge on; default the rest."),
-    ] = None,
+    window: Window = None,
+    test_window: TestWindow = None,
+    *,
+    reading: LogOptions,
     out: Annotated[
         Path,
-        typer.Option(
-            metavar="FOLDER", help="Folder for the results; what it has is not computed again."
-        ),
+        Option("Folder for the results; those that it has are not computed again", metavar="PATH"),
     ] = Path("benchmark"),
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Compute again what the folder has.")
-    ] = False,
-    *,
-    columns: Columns,
-    resample: Resample = None,
-    decimate: Decimate = None,
-    hold: HoldOption = "foh",
-    json: Json = False,
-    quiet: Quiet = False,
+    overwrite: Overwrite = False,
+    printing: Printing,
 ) -> None:
-    """Compare all models on many records."""
+    """Compare all models on many records.
+
+    The part fitted is --window, by default the first half; the test is on --test-window, by default
+    the rest.
+    """
     from ...benchmarking.board import benchmark
 
     if not files:
-        refuse_without_effect(context, ("train", "test"), "without a FILE")
+        refuse_without_effect(("window", "test_window"), "without a FILE")
     if not files and listed is None:
-        names = ("time", "drive", "displacement", "unit", "dt", "resample", "decimate", "hold")
-        refuse_without_effect(context, names, "without a FILE or --list")
-    result = Output(out, overwrite=True, json=json, quiet=quiet)
+        refuse_without_effect(vars(reading), "without a FILE or --list")
     can_be_folder(out)
-
-    def read(file: Path) -> Dataset:
-        return columns.read(file, hold, resample, decimate=decimate)
-
     records: list[str | BenchmarkRecord] = list(record or [])
-    records += [_record(file, read(file), train, test, None) for file in files or []]
+    records += [_record(file, reading.log(file), window, test_window, None) for file in files or []]
     if listed is not None:
         for file, keys in _lines(listed):
             other = None
             if "other" in keys:
                 path = listed.parent / keys["other"]
-                other = windowed(read(path), path, "other-test", keys.get("other-test"))
-            records.append(_record(file, read(file), keys.get("train"), keys.get("test"), other))
+                other = cut(reading.log(path), path, _part(keys, "other-window"), "other-window")
+            parts = _part(keys, "window"), _part(keys, "test-window")
+            records.append(_record(file, reading.log(file), *parts, other))
     board = benchmark(
-        records or None, model or None, folder=out, overwrite=overwrite, progress=result.progress
+        records or None, model or None, folder=out, overwrite=overwrite, progress=printing.progress
     )
     written = board.save(out)
     if all(one.error for one in board.results):
         first = board.results[0]
         raise DataError(f"no model was found of any record; {first.record}: {first.error}")
-    result.show(board.summary(), board.document(), written)
+    printing.show(board.summary(), board.document(), written)
+
+
+def _part(keys: dict[str, str], name: str) -> Part:
+    """Parse a window of a line of a list."""
+    return WINDOW.parse(name, keys[name]) if name in keys else None
 
 
 def _record(
-    file: Path, log: Dataset, train: str | None, test: str | None, other: Dataset | None
+    file: Path, log: Dataset, window: Part, test: Part, other: Dataset | None
 ) -> BenchmarkRecord:
     """Make the record of a log."""
     from ...benchmarking.record import BenchmarkRecord
 
     with of_file(file):
-        return BenchmarkRecord.of_log(
-            log,
-            train=None if train is None else seconds("--train", train),
-            test=None if test is None else seconds("--test", test),
-            other=other,
-        )
+        return BenchmarkRecord.of_log(log, train=window, test=test, other=other)
 
 
 def _lines(listed: Path) -> list[tuple[Path, dict[str, str]]]:
@@ -153,13 +121,13 @@ def _lines(listed: Path) -> list[tuple[Path, dict[str, str]]]:
         if not words:
             continue
         keys = dict(word.partition("=")[::2] for word in words[1:])
-        if len(keys) < len(words) - 1 or not keys.keys() <= set(SAID) or not all(keys.values()):
+        if len(keys) < len(words) - 1 or not keys.keys() <= set(ENTRIES) or not all(keys.values()):
             raise DataError(
                 f"{where}: '{' '.join(words[1:])}': expected NAME=VALUE with the names "
-                f"{', '.join(SAID)}, each once at most"
+                f"{', '.join(ENTRIES)}, each once at most"
             )
-        if "other-test" in keys and "other" not in keys:
-            raise DataError(f"{where}: other-test has no effect without other=")
+        if "other-window" in keys and "other" not in keys:
+            raise DataError(f"{where}: other-window has no effect without other=")
         entries.append((listed.parent / words[0], keys))
     if not entries:
         raise DataError(f"{listed}: no log is listed: expected one a line")

@@ -3,29 +3,14 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ...errors import ParameterError
-from ..control.loop_options import (
-    PAPER,
-    AmplifierBandwidth,
-    Interval,
-    Limits,
-    Loop,
-    LoopDelay,
-    Noise,
-    StageFile,
-    driven_by_voltage,
-    noise_metres,
-    refuse_of_other_stage,
-    simulated,
-)
-from ..error_messages import report_errors
-from ..options import Json, ModelFile, Out, Overwrite, Quiet
+from ..command import Option, command
+from ..control.loop_options import PAPER, LoopOptions, Simulation, Stage, known_model
+from ..options import ModelFile, Sensitivity
 from ..output import Output
+from ..values import FREQUENCY, numbers
 
 __all__ = ["compare_controllers_command"]
 
@@ -39,79 +24,58 @@ SPELLINGS = {
 }
 
 
-@report_errors
+@command()
 def compare_controllers_command(
-    context: typer.Context,
     model: ModelFile,
-    stage: StageFile = None,
-    out: Out = Path("results"),
-    overwrite: Overwrite = False,
-    dt: Interval = None,
-    limits: Limits = None,
-    rates: Annotated[
-        str,
-        typer.Option(metavar="A,B,C", help="Rates of the references in Hz: slow, medium, fast."),
+    stage: Stage = None,
+    frequencies: Annotated[
+        str, Option("Frequencies of the references: slow, medium, fast", metavar="A,B,C")
     ] = "1,5,20",
     controllers: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="Controllers, separated by commas; default all.",
-            show_default=False,
-        ),
+        str | None, Option("Controllers, separated by commas; default all", metavar="NAMES")
     ] = None,
-    sensitivity: Annotated[float, typer.Option(help="Largest sensitivity Ms of each.")] = 2.0,
-    delay: LoopDelay = 0.0,
-    noise_nm: Noise = 0.0,
-    bandwidth: AmplifierBandwidth = math.inf,
-    seeds: Annotated[
-        int, typer.Option(help="Draws of the sensor noise that each controller is judged by.")
-    ] = 3,
-    searches: Annotated[
-        int, typer.Option(help="Searches, each with another seed, of which the median is taken.")
-    ] = 3,
-    seed: Annotated[int, typer.Option(help="Random seed of the searches and sensor noise.")] = 1,
-    json: Json = False,
-    quiet: Quiet = False,
+    sensitivity: Sensitivity = 2.0,
+    draws: Annotated[int, Option("Draws of the sensor noise by which each is judged")] = 3,
+    runs: Annotated[int, Option("Independent searches, of which the median is taken")] = 3,
+    *,
+    loop: LoopOptions,
+    simulation: Simulation,
+    output: Output,
 ) -> None:
     """Compare controllers on one stage."""
     from ..._support.files.writing import picture_files
     from ...control.comparing.compare import compare_controllers
-    from ...control.timing import Timing
     from ...control.tuning.goal import TuningSearch
     from ...control.tuning.margins import Margins
-    from ...identification.fitted.model_file import load
 
-    of_model = stage != PAPER
-    refuse_of_other_stage(context, of_model)
-    known = load(model) if of_model else driven_by_voltage(load(model), model)
-    settings = Loop(of_model, dt, limits, None, None, None, None)
-    result = Output(out, overwrite=overwrite, json=json, quiet=quiet)
-    result.will_write(["controllers.json", *picture_files("controllers")])
-    plant = simulated(stage, known, noise_metres(noise_nm), bandwidth, seed)
+    own = stage != PAPER
+    simulation.check(own=own, searched=True)
+    known = known_model(model, zero=False, paper=not own)
+    output.will_write(["controllers.json", *picture_files("controllers")])
+    plant = simulation.stage(stage, known)
     comparison = compare_controllers(
         plant,
         known,
-        dt=settings.dt(known, None),
-        limits=settings.volts(known),
-        rates=_rates(rates),
+        dt=loop.interval(known, None, own=own),
+        limits=loop.volts(known, own=own),
+        rates=_frequencies(frequencies),
         controllers=None
         if controllers is None
         else [SPELLINGS.get(one, one) for one in map(str.strip, controllers.split(","))],
         margins=Margins(sensitivity=sensitivity),
-        timing=Timing(delay=delay),
-        seeds=seeds,
-        searches=searches,
-        search=TuningSearch(seed=seed),
+        timing=simulation.timing,
+        seeds=draws,
+        searches=runs,
+        search=TuningSearch(seed=simulation.seed),
     )
-    result.show(str(comparison), comparison.document(), comparison.save(out))
+    output.show(str(comparison), comparison.document(), output.write(comparison.save))
 
 
-def _rates(text: str) -> tuple[float, float, float]:
-    try:
-        slow, medium, fast = (float(one) for one in text.split(","))
-    except ValueError:
-        raise ParameterError("--rates", f"{text!r}", "three rates in Hz, as 1,5,20") from None
+def _frequencies(text: str) -> tuple[float, float, float]:
+    found = numbers("--frequencies", text, FREQUENCY)
+    if len(found) != 3:
+        raise ParameterError("--frequencies", f"'{text}'", "three, as 1,5,20Hz")
+    slow, medium, fast = found
     if not 0.0 < slow < medium < fast < math.inf:
-        raise ParameterError("--rates", f"{text!r}", "three rates in Hz in rising order")
+        raise ParameterError("--frequencies", f"'{text}'", "three in rising order")
     return slow, medium, fast
