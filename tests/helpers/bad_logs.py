@@ -65,6 +65,7 @@ KINDS = [
     Kind("HDF5", "log.h5", write.hdf5, library="h5py", extra="hdf5"),
     Kind("TDMS", "log.tdms", _tdms, timed=False, library="nptdms", extra="tdms"),
     Kind("Parquet", "log.parquet", write.parquet, library="pyarrow", extra="parquet"),
+    Kind("XLSX", "log.xlsx", write.xlsx, library="openpyxl", extra="xlsx"),
     Kind("MDF", "log.mf4", write.mdf, library="asammdf", extra="mdf"),
     Kind("AFM curves", "curve.tab", write.afm, library="afmformats", extra="afm"),
 ]

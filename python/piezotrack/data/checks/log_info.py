@@ -229,6 +229,7 @@ def info(
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
     missing: Missing = None,
+    skip: int = 0,
 ) -> LogInfo:
     """Look into a log: columns, sampling, what the drive does, and what it can determine.
 
@@ -237,7 +238,7 @@ def info(
 
     Parameters
     ----------
-    path, time, drive, displacement, units, dt, missing
+    path, time, drive, displacement, units, dt, missing, skip
         As in `piezotrack.read`.
 
     Returns
@@ -265,7 +266,7 @@ def info(
     >>> print(found.determines[1])
     one amplitude, 60 V: no smaller loops; weights of small plays are those of this loop
     """
-    log = Log(path)
+    log = Log(path, skip)
     given = {"time": time, "drive": drive, "displacement": displacement}
     roles: dict[str, Column] = {}
     problems: list[str] = []

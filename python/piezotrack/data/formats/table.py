@@ -147,6 +147,10 @@ class Table(ABC):
     def count(self, column: Column) -> int:
         """Return the number of samples of a column."""
 
+    def is_empty(self, column: Column) -> bool:
+        """Whether a column has no reading at all."""
+        return bool(np.isnan(self.column(column)).all())
+
     def interval(self, main: Sequence[Column]) -> float | None:
         """Return the sampling interval that the file states for columns [s], or None."""
         del main
