@@ -108,6 +108,10 @@ architecture: $(VENV)/installed ## Draw docs/architecture.svg from the code
 pictures: $(VENV)/installed ## Draw the pictures of the pages that no example draws
 	$(BIN)/python docs/make_pictures.py
 
+sentences: $(VENV)/pip ## All sentences that the program prints, to be read: target/sentences.txt
+	@mkdir -p target
+	$(BIN)/python .ci/sentences.py > target/sentences.txt
+
 notices: ## Write THIRD-PARTY.txt: the licences of the crates that are linked in
 	$(PYTHON) docs/make_notices.py
 
