@@ -24,21 +24,13 @@ __all__ = ["Output", "Printing", "can_be_folder", "print_words", "wrapped"]
 # Lines that a command prints at most without -v.
 MOST_LINES = 25
 # Endings by which --out is a file.
-ENDINGS = (
-    *(
-        ".csv",
-        ".npz",
-        ".mat",
-        ".parquet",
-        ".json",
-        ".png",
-        ".svg",
-        ".pdf",
-        ".html",
-        ".xlsx",
-        ".txt",
-    ),
-)
+ENDINGS = {
+    f".{name}"
+    for name in (
+        "csv npz mat parquet json png svg pdf html xlsx txt "
+        "doc docx xls h5 hdf5 tdms jpg jpeg tif eps md yaml c h py"
+    ).split()
+}
 
 # Columns that lines have at most and at least where they are wrapped, and what is before a note.
 WIDEST, NARROWEST, NOTE = 100, 40, "note  "
