@@ -112,7 +112,7 @@ notices: ## Write THIRD-PARTY.txt: the licences of the crates that are linked in
 	$(PYTHON) docs/make_notices.py
 
 clean: ## Remove what was built, not your results
-	rm -rf $(VENV) target demo report
+	rm -rf $(VENV) target demo report docs/gallery docs/reference
 
 $(VENV)/pip:
 	@command -v cargo >/dev/null || { echo "A Rust toolchain is needed, there is no cargo: install it from https://rustup.rs" >&2; exit 1; }

@@ -45,6 +45,7 @@ def settings() -> dict[str, Any]:
         "show_memory": False,
         "show_signature": False,
         "remove_config_comments": True,
+        "min_reported_time": 1e9,
         "write_computation_times": False,
         # The reference shows the scripts that write a name, not all that have such a result.
         "inspect_global_variables": False,

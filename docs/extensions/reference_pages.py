@@ -15,6 +15,7 @@ import types
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from unittest.mock import patch
 
 from gallery import SCRIPTS
 from sphinx.util import logging
@@ -54,7 +55,8 @@ def places() -> dict[str, str]:
     for name in sorted(top - set(ROOMS)):
         value = getattr(pt, name)
         if name != "__version__" and not inspect.ismodule(value):
-            found.setdefault(f"piezotrack.{name}", "index")
+            home = value.__module__.split(".")[1]
+            found.setdefault(f"piezotrack.{name}", home if home in ROOMS else "index")
     return found
 
 
@@ -66,11 +68,14 @@ def pages() -> dict[str, str]:
         own = [name for name, page in names.items() if page == room]
         written[room] = f"# pt.{room}\n\n{first(f'piezotrack.{room}')}\n\n{entries(own)}"
     rest = [name for name, page in names.items() if page == "index"]
+    errors = [name for name in rest if isinstance(valued(name), type)]
+    others = [name for name in rest if name not in errors]
     listed = "\n".join(["commands", *ROOMS])
     written["index"] = (
         "# Reference\n\nPython: `import piezotrack as pt`; the same text is printed by"
         " `help(pt.identify)`.\n\n"
-        f"```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n\n## Exceptions\n\n" + entries(rest)
+        f"```{{toctree}}\n:maxdepth: 1\n\n{listed}\n```\n\n## Figures\n\n{entries(others)}\n\n"
+        f"## Exceptions\n\n{entries(errors)}"
     )
     return written
 
@@ -127,10 +132,9 @@ def entry(name: str) -> str:
 
 def commands() -> str:
     """Return the page of the commands: the help of each, as it is printed."""
-    from piezotrack.cli.commands import COMMANDS
-
-    lines = ["# Commands\n", f"```text\n{printed()}\n```\n"]
-    for name in COMMANDS:
+    overview = printed()
+    lines = ["# Commands\n", f"```text\n{overview}\n```\n"]
+    for name in re.findall(r"^  ([a-z][a-z-]*)  ", overview, re.MULTILINE):
         lines += [f"## {name}\n", f"```text\n{printed(name)}\n```\n"]
     return "\n".join(lines)
 
@@ -140,8 +144,11 @@ def printed(*command: str) -> str:
     from piezotrack.cli.commands import app
 
     run: Any = app
-    os.environ.update(COLUMNS="88", TERMINAL_WIDTH="88", NO_COLOR="1")
-    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.suppress(SystemExit):
+    with (
+        patch.dict(os.environ, COLUMNS="88", NO_COLOR="1"),
+        contextlib.redirect_stdout(io.StringIO()) as out,
+        contextlib.suppress(SystemExit),
+    ):
         run([*command, "--help"], prog_name="piezotrack", standalone_mode=False)
     return "\n".join(line.rstrip() for line in out.getvalue().strip().splitlines())
 
