@@ -82,7 +82,7 @@ def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> 
 
 def _along(campaign: Campaign, fig: Figure | SubFigure | None) -> Figure:
     """Draw the rms of one model over the records, in the order given."""
-    figure, axes = sheet(fig, (7.5, 3.6), (("costs",),))
+    figure, axes = sheet(fig, (7.5, 3.6), (("costs",),), least=1.9)
     ax, (model,) = axes["costs"], campaign.models
     rms = [math.nan if one.error is not None else one.rms_percent for one in campaign]
     places = np.arange(1.0, len(rms) + 1.0)
