@@ -26,7 +26,7 @@ def reproduce_command(
 ) -> None:
     """Repeat the experiments of Xu and Li 2010.
 
-    On a simulated stage, with a report as HTML, PDF and JSON.
+    On a simulated stage, with a report as Markdown, pictures and JSON.
     """
     from ...xu_li_2010.reproduction import REPORT, reproduce
 
