@@ -149,7 +149,11 @@ class Table(ABC):
 
     def is_empty(self, column: Column) -> bool:
         """Whether a column has no reading at all."""
-        return bool(np.isnan(self.column(column)).all())
+        try:
+            return bool(np.isnan(self.column(column)).all())
+        except DataError:
+            # One that cannot be read is not known to be empty.
+            return False
 
     def interval(self, main: Sequence[Column]) -> float | None:
         """Return the sampling interval that the file states for columns [s], or None."""
