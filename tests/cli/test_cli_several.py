@@ -36,7 +36,16 @@ def _logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_several_logs_give_one_model() -> None:
-    options = ("--window", "0:3", "--window", "0.4:", "--delay", "0", "--delay", "fit")
+    options = (
+        "--window",
+        "0:3",
+        "--window",
+        "0.4:",
+        "--sensor-delay",
+        "0",
+        "--sensor-delay",
+        "fit",
+    )
     weights = ("--weight", "1", "--weight", "2")
     printed = ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, *options, *weights, "-v")
     fit = pt.identify(
@@ -65,7 +74,7 @@ def test_several_logs_give_one_model() -> None:
 
 @pytest.mark.slow
 def test_an_option_given_once_is_for_all_logs() -> None:
-    given = ("--delay", "fit", "--window", "1:", "--json")
+    given = ("--sensor-delay", "fit", "--window", "1:", "--json")
     document = json.loads(ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, *given))
     (model,) = document["models"]
     delays = [one["delay"]["value"] for one in model["records"]]
@@ -86,7 +95,17 @@ def test_several_logs_share_the_creep_of_a_model_that_is_searched() -> None:
 
 @pytest.mark.slow
 def test_a_model_of_several_logs_is_used_like_any_other() -> None:
-    ran("identify", "a.csv", "b.csv", *KINDS, *FIXED, "--delay", "0", "--delay", "0.02")
+    ran(
+        "identify",
+        "a.csv",
+        "b.csv",
+        *KINDS,
+        *FIXED,
+        "--sensor-delay",
+        "0",
+        "--sensor-delay",
+        "0.02",
+    )
     ran("simulate", "results/dahl.json", "b.csv", "--out", "simulated.csv")
     train = ("--window", "0:2", "--test", "2:4")
     ran("identify", "a.csv", *KINDS, *FIXED, "--test", "b.csv", "--out", "one")
@@ -97,7 +116,10 @@ def test_a_model_of_several_logs_is_used_like_any_other() -> None:
     ("options", "said"),
     [
         (("--window", "0:1", "--window", "0:2", "--window", "0:3"), "--window is given 3 times"),
-        (("--delay", "0", "--delay", "0", "--delay", "0"), "--delay is given 3 times with 2 logs"),
+        (
+            ("--sensor-delay", "0", "--sensor-delay", "0", "--sensor-delay", "0"),
+            "--sensor-delay is given 3 times with 2 logs",
+        ),
         (("--weight", "0"), "record 1 (a.csv): --weight is 0: expected a finite number above 0"),
         (("--weight", "1", "--weight", "-1"), "record 2 (b.csv): --weight is -1"),
         (("--history", "virgin", "--history", "old"), "--history is 'old'"),

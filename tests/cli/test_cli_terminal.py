@@ -13,7 +13,7 @@ import pytest
 
 import piezotrack as pt
 from commands import COMMAND, names, refusal, write_model
-from piezotrack.cli.terminal import PlainStream, one_line
+from piezotrack.cli.process.terminal import PlainStream, one_line
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
 WORK = ["feedforward", "dahl.json", "sine:0.5Hz,0..50um,2s", "--dt", "0.02"]

@@ -13,6 +13,7 @@ __all__ = ["as_options", "command_at_work"]
 
 # Arguments whose option has another name.
 OPTIONS = {
+    "delay": "sensor_delay",
     "rates": "frequencies",
     "searches": "runs",
     "count": "plays",
@@ -84,11 +85,11 @@ def as_options(error: object) -> str:
     known = {name for one in command.params for name in one.opts} if command else set()
 
     def in_options(match: re.Match[str]) -> str:
-        option = _option(match[1])
+        option = _option(match[1], known)
         return f"{option} {match[2] or ''}" if option in known else match[0]
 
     text, argument = str(error), getattr(error, "argument", None) or ""
-    if (option := _option(argument)) in known:
+    if (option := _option(argument, known)) in known:
         text = re.sub(rf"(^|: ){re.escape(argument)}(?=[ [])", rf"\1{option}", text, count=1)
     if not known & {"--displacement", "--drive"}:
         for python, words in IN_THE_HEADER:
@@ -109,5 +110,7 @@ def as_options(error: object) -> str:
     return re.sub(r"(--[a-z-]+) (?=[,;:)\n]|\.(?:\s|$)|$)", r"\1", text)
 
 
-def _option(argument: str) -> str:
-    return f"--{OPTIONS.get(argument, argument)}".replace("_", "-")
+def _option(argument: str, known: set[str]) -> str:
+    """Return the option of an argument: of its other name, where the command has that."""
+    option = f"--{OPTIONS.get(argument, argument)}".replace("_", "-")
+    return option if option in known else f"--{argument}".replace("_", "-")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from importlib import import_module
 from typing import Any
@@ -17,9 +16,6 @@ from .help_page import coloured_help, list_page
 from .values import named, nearest
 
 __all__ = ["COMMANDS", "app", "run"]
-
-# No window is ever opened.
-os.environ["MPLBACKEND"] = "Agg"
 
 # The heading is the folder of the command.
 HEADINGS = {
@@ -167,7 +163,7 @@ def run() -> None:
     """Run the command with the arguments of the process."""
     try:
         try:
-            app()
+            app(prog_name="piezotrack")
         finally:
             sys.stdout.flush()
     except OSError as error:

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from ..errors import Interrupted, PiezotrackError
-from .interruption import acknowledge_interrupt
+from .process.interruption import acknowledge_interrupt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

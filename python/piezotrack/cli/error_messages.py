@@ -15,8 +15,9 @@ import click
 from .._support.display.progress_bar import one_clock
 from ..errors import PiezotrackError
 from .advice import as_options, command_at_work
-from .interruption import at_rest, at_work, exit_code, stopped
-from .terminal import one_line
+from .process.interruption import at_rest, at_work, exit_code, stopped
+from .process.pictures import prepare_pictures
+from .process.terminal import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,6 +45,7 @@ def report_errors(command: Callable[P, None]) -> Callable[P, None]:
         context = click.get_current_context(silent=True)
         command_at_work.set(context.command if context else None)
         try:
+            prepare_pictures()
             with at_work(), one_clock():
                 command(*args, **kwargs)
                 sys.stdout.flush()

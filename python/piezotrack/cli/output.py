@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import ParameterError
 from .advice import as_options
 from .command import Option, group
-from .terminal import one_line
+from .process.terminal import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping

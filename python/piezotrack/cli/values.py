@@ -310,7 +310,7 @@ def nearest(text: str, names: Iterable[str]) -> str:
     by_lower = {name.lower().lstrip("-"): name for name in names}
     text = text.lower().lstrip("-")
     near = [low for low in by_lower if len(text) > 2 and low.startswith(text)][:1]
-    near = near or get_close_matches(text, by_lower, n=1, cutoff=0.6)
+    near = near or get_close_matches(text, by_lower, n=1, cutoff=0.7)
     return f"; did you mean {by_lower[near[0]]}?" if near else ""
 
 

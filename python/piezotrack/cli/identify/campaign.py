@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from ...errors import DataError, Interrupted, ParameterError
 from ..command import Argument, Option, command, refuse_without_effect
-from ..interruption import acknowledge_interrupt
 from ..option_groups import LogOptions
 from ..options import WINDOW, Threads, cut
 from ..output import Printing, can_be_folder
+from ..process.interruption import acknowledge_interrupt
 from ..values import TIME
 from .fit_options import (
     FitOptions,

@@ -193,8 +193,8 @@ class RecordOptions:
     """Sensor and history, once, or once for each log."""
 
     offset: Annotated[bool, Option("Fit a constant sensor offset; default yes")] = True
-    delay: Annotated[
-        list[str] | None, Option("Sensor delay; default none", metavar="fit|TIME|LOW:HIGH")
+    sensor_delay: Annotated[
+        list[str] | None, Option("Delay of the sensor; default none", metavar="fit|TIME|LOW:HIGH")
     ] = None
     drift: Annotated[
         list[str] | None,
@@ -210,9 +210,9 @@ class RecordOptions:
 
     def check(self, count: int) -> None:
         """Parse all of them, for a number of logs, before these are read."""
-        for name in ("delay", "drift", "history"):
-            _check_count(f"--{name}", getattr(self, name), count)
-        for text in self.delay or []:
+        for name in ("sensor_delay", "drift", "history"):
+            _check_count(f"--{name.replace('_', '-')}", getattr(self, name), count)
+        for text in self.sensor_delay or []:
             delay_asked(text)
         for text in self.drift or []:
             drift_asked(text)
@@ -220,7 +220,7 @@ class RecordOptions:
     def of_each(self, count: int) -> list[dict[str, Any]]:
         """Arguments of `Record` or `identify` for each of a number of logs."""
         rows = zip(
-            each_of("--delay", self.delay, count),
+            each_of("--sensor-delay", self.sensor_delay, count),
             each_of("--drift", self.drift, count),
             each_of("--history", self.history, count),
             strict=True,
@@ -398,9 +398,9 @@ def delay_asked(text: str | None) -> bool | float | tuple[float, float] | None:
     if text is None or text == "fit":
         return None if text is None else True
     if ":" in text:
-        low, high = Ranged(LOOP_TIME, "LOW:HIGH").parse("--delay", text)
+        low, high = Ranged(LOOP_TIME, "LOW:HIGH").parse("--sensor-delay", text)
         return low or 0.0, high or 0.0
-    return _time("--delay", text, "fit, a time as 2ms, or bounds as 0:5ms")
+    return _time("--sensor-delay", text, "fit, a time as 2ms, or bounds as 0:5ms")
 
 
 def drift_asked(text: str) -> bool | float:
@@ -422,6 +422,6 @@ def _creep(text: str | None) -> bool | list[float] | None:
 
 def _time(option: str, text: str, expected: str) -> float:
     try:
-        return LOOP_TIME.parse(option, text) if option == "--delay" else TIME.parse(option, text)
+        return LOOP_TIME.parse(option, text) if option == "--sensor-delay" else TIME.parse(option, text)
     except ParameterError:
         raise ParameterError(option, f"'{text}'", expected, verb="has") from None

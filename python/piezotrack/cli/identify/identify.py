@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..._support.display.progress_parts import Parts
 from ...errors import Interrupted, ParameterError
 from ..command import Option, command
-from ..interruption import acknowledge_interrupt
 from ..option_groups import LogOptions
 from ..options import TestLog, TestWindow, Threads, Windows, command_line, cut, of_file
 from ..output import Output
+from ..process.interruption import acknowledge_interrupt
 from .fit_options import (
     AUTO,
     FitOptions,
