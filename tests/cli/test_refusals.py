@@ -51,7 +51,7 @@ BAD_LOGS: dict[str, tuple[Callable[[], str | bytes], int | None, tuple[str, ...]
     "constant drive": (lambda: column(1, "5"), None, ("drive is constant at 5 V", "expected")),
     "dead sensor": (lambda: column(2, "7"), None, ("displacement is constant", "sensor")),
     "binary": (lambda: bytes(range(256)) * 10, 1, ("is not a text log",)),
-    "an archive": (lambda: b"PK\x03\x04" + bytes(100), None, ("zip archive",)),
+    "an archive": (lambda: b"PK\x03\x04" + bytes(100), None, ("is a zip archive", "expected")),
 }
 
 

@@ -38,7 +38,7 @@ __all__ = ["Metrics", "Tracking"]
 LEARNT = 3
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Metrics(ErrorStatistics):
     """Metrics of a tracked motion; errors are desired less actual.
 
@@ -53,6 +53,14 @@ class Metrics(ErrorStatistics):
 
     phase_lag: float | None
     widest_loop: float | None
+
+    def _rows(self) -> list[tuple[str, str]]:
+        rows = super()._rows()
+        if self.phase_lag is not None:
+            rows.append(("phase lag", f"{math.degrees(self.phase_lag):.3g}\N{DEGREE SIGN}"))
+        if self.widest_loop is not None:
+            rows.append(("widest loop", f"{100.0 * self.widest_loop:.3g} % of travel"))
+        return rows
 
     def __str__(self) -> str:
         text = super().__str__()
