@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs reference architecture refused notices c-library c-header c-header-test clean
+.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs crate-docs architecture pictures notices c-library c-header c-header-test sentences clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -95,25 +95,31 @@ c-header-test:
 bench: ## Criterion benches: throughput of the swarm, latency of a step
 	cargo bench --locked
 
-docs: ## The crates' pages
+# Warnings end the build: dead links, pages without a place, public names without an entry.
+docs: $(VENV)/installed $(VENV)/site-tools ## The site: target/site/index.html; pages, reference, gallery
+	$(BIN)/sphinx-build -q -W --keep-going -j auto -d target/site-cache docs target/site
+
+crate-docs: ## The crates' pages: target/doc
 	cargo doc --locked --no-deps
 
-reference: $(VENV)/installed ## Write docs/reference from the commands and docstrings
-	$(BIN)/python docs/make_reference.py
-
-architecture: $(VENV)/installed ## Draw docs/architecture.svg and write the tree of its page, from the code
+architecture: $(VENV)/installed ## Draw docs/architecture.svg from the code
 	$(BIN)/python docs/make_architecture.py
 
-refused: $(VENV)/installed $(VENV)/tools ## Write docs/refused-logs.md: bad logs, and what is said of each
-	$(BIN)/python docs/make_refused_logs.py
+pictures: $(VENV)/installed ## Draw the pictures of the pages that no example draws
+	$(BIN)/python docs/make_pictures.py
+
+sentences: $(VENV)/pip ## All sentences that the program prints, to be read: target/sentences.txt
+	@mkdir -p target
+	$(BIN)/python .ci/sentences.py > target/sentences.txt
 
 notices: ## Write THIRD-PARTY.txt: the licences of the crates that are linked in
 	$(PYTHON) docs/make_notices.py
 
 clean: ## Remove what was built, not your results
-	rm -rf $(VENV) target demo report
+	rm -rf $(VENV) target demo report docs/gallery docs/reference
 
 $(VENV)/pip:
+	@command -v cargo >/dev/null || { echo "A Rust toolchain is needed, there is no cargo: install it from https://rustup.rs" >&2; exit 1; }
 	$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(None if v >= (3, 11) else f"Python 3.11 or newer is needed, this is {v.major}.{v.minor}")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1' 'maturin>=1.9,<2'
@@ -133,4 +139,8 @@ $(VENV)/installed: $(WHEELS)/built
 
 $(VENV)/tools: $(VENV)/pip pyproject.toml
 	$(BIN)/python -m pip install --quiet --group test
+	@touch $@
+
+$(VENV)/site-tools: $(VENV)/pip pyproject.toml
+	$(BIN)/python -m pip install --quiet --group docs
 	@touch $@

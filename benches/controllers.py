@@ -2,7 +2,7 @@
 
     python benches/controllers.py [FOLDER]
 
-writes controllers_*.png and, as controllers_*.md, the tables of docs/compare-controllers.md into
+writes controllers_*.png and, as controllers_*.md, the tables of benches/controllers.md into
 the folder.
 """
 

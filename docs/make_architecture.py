@@ -1,7 +1,4 @@
-"""Draw the architecture from the code: rooms by layers, each with the first line of its docstring.
-
-Writes architecture.svg beside this file, and the tree in architecture.md between its two markers.
-"""
+"""Draw the architecture from the code: packages in layers, each with its docstring's first line."""
 
 from __future__ import annotations
 
@@ -22,8 +19,6 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 PACKAGE = ROOT / "python" / "piezotrack"
-CORE = ROOT / "rust" / "core" / "src"
-BEGIN, END = "<!-- tree -->", "<!-- end of the tree -->"
 ROAD = (
     ("log", "data/"),
     ("problem", "problem/"),
@@ -35,12 +30,10 @@ ROAD = (
 
 
 def first_line(folder: Path) -> str:
-    """Return the first line of a folder's docstring: of its __init__.py or mod.rs."""
-    if (init := folder / "__init__.py").exists():
-        return (ast.get_docstring(ast.parse(init.read_text("utf-8"))) or "").partition("\n")[0]
-    text = (folder / "mod.rs").read_text("utf-8")
-    lines = [line[3:].strip() for line in text.splitlines() if line.startswith("//!")]
-    return " ".join(lines).partition(". ")[0].rstrip(".") + "."
+    """Return the first line of a package's docstring."""
+    return (
+        ast.get_docstring(ast.parse((folder / "__init__.py").read_text("utf-8"))) or ""
+    ).partition("\n")[0]
 
 
 def layers(container: str) -> list[list[str]]:
@@ -50,41 +43,7 @@ def layers(container: str) -> list[list[str]]:
         if contract["type"] == "layers" and container in contract["containers"]:
             return [re.split(r" [|:] ", layer) for layer in contract["layers"]]
     folder = ROOT / "python" / Path(*container.split("."))
-    return [[room.name] for room in sorted(folder.iterdir()) if room.is_dir() and is_room(room)]
-
-
-def is_room(folder: Path) -> bool:
-    """Return whether a folder holds code."""
-    return (folder / "__init__.py").exists() or (folder / "mod.rs").exists()
-
-
-def rooms(folder: Path, container: str | None) -> list[Path]:
-    """Return the rooms of a folder: by the layers of a package, else by name."""
-    if container is None:
-        return sorted(below for below in folder.iterdir() if below.is_dir() and is_room(below))
-    named = [folder / name for layer in layers(container) for name in layer]
-    return [below for below in named if below.is_dir()]
-
-
-def tree() -> str:
-    """Write the tree of rooms, each with what its docstring says."""
-    lines = ["python/piezotrack/"]
-    for room in rooms(PACKAGE, "piezotrack"):
-        lines.append(f"  {room.name + '/':<20}{first_line(room)}")
-        if room.name in ("identification", "control"):
-            lines += [
-                f"    {below.name + '/':<18}{first_line(below)}"
-                for below in rooms(room, f"piezotrack.{room.name}")
-            ]
-    lines.append("rust/core/src/")
-    for room in rooms(CORE, None):
-        lines.append(f"  {room.name + '/':<20}{first_line(room)}")
-        if room.name in ("identify", "models"):
-            lines += [
-                f"    {below.name + '/':<18}{first_line(below)}" for below in rooms(room, None)
-            ]
-    lines.append("rust/control/src/       What runs at the sample rate: no_std, no allocation.")
-    return "\n".join(lines)
+    return [[room.name] for room in sorted(folder.iterdir()) if (room / "__init__.py").exists()]
 
 
 def draw() -> None:
@@ -153,14 +112,5 @@ def row_of(ax: Axes, corner: tuple[float, float], width: float, name: str, text:
         ax.text(corner[0] + 0.13, corner[1] + 0.18, text, va="center", fontsize=6.5, color="0.25")
 
 
-def main() -> None:
-    """Write both."""
-    page = HERE / "architecture.md"
-    text = page.read_text("utf-8")
-    before, after = text.partition(BEGIN)[0], text.partition(END)[2]
-    page.write_text(f"{before}{BEGIN}\n```text\n{tree()}\n```\n{END}{after}", "utf-8")
-    draw()
-
-
 if __name__ == "__main__":
-    main()
+    draw()

@@ -34,6 +34,7 @@ def stages() -> dict[str, pt.DahlStage | pt.FirstOrderDahlStage]:
         "first-order-dahl",
         parameters={"stiffness": second.stiffness},
         method=pt.Descents(seed=1),
+        history="settled",
     )
     print(fit.summary(), end="\n\n")
     return {"second order, Table 1": second, "first order": fit.model}
@@ -49,7 +50,7 @@ def main(folder: Path) -> None:
     """Simulate both, print and draw."""
     u = drive(CYCLES)
     figure, axes = plt.subplots(1, 3, figsize=(11, 4.0), layout="constrained")
-    print("lowest displacement of a cycle [um]")
+    print("lowest displacement of a cycle [µm]")
     print("  cycle" + " " * 19 + "".join(f"{cycle:>10}" for cycle in SHOWN))
     for (name, stage), ax, marker in zip(stages().items(), axes, "os", strict=False):
         x = 1e6 * stage.simulate(u, 1 / RATE).x.reshape(CYCLES, -1)
@@ -57,7 +58,7 @@ def main(folder: Path) -> None:
         print(f"  {name:<24}" + "".join(f"{low[cycle - 1]:>10.4f}" for cycle in SHOWN))
         for cycle, style, shade in zip(SHOWN, STYLES, SHADES, strict=True):
             ax.plot(u[: 4 * RATE], x[cycle - 1], style, color=shade, lw=1.2, label=f"cycle {cycle}")
-        ax.set(title=name, xlabel="drive [V]", ylabel="displacement [um]")
+        ax.set(title=name, xlabel="drive [V]", ylabel="displacement [µm]")
         ax.legend(frameon=False, fontsize="small")
         axes[2].plot(
             np.arange(1, CYCLES + 1),
@@ -72,7 +73,7 @@ def main(folder: Path) -> None:
     axes[2].set(
         title="drift of the loop",
         xlabel="cycle",
-        ylabel="lowest displacement - that of cycle 2 [um]",
+        ylabel="lowest displacement - that of cycle 2 [µm]",
     )
     axes[2].legend(frameon=False, fontsize="small")
     figure.savefig(folder / "drift.png", dpi=150)

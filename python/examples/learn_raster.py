@@ -103,7 +103,7 @@ def draw(axes: NDArray[np.object_], desired: Array, actual: Array, words: str) -
     errors.plot(1e6 * at, (forward - at) / pixel, color="#c0341d", label="forward")
     errors.plot(1e6 * at, (backward - at) / pixel, "--", color="#1b6ca8", label="backward")
     errors.set(
-        xlabel="pixel at [um]",
+        xlabel="pixel at [µm]",
         ylabel="tip beside its pixel [pixels]",
         title=f"lines {1e9 * apart:.0f} nm apart,\n{apart / pixel:.2f} pixels (rms)",
     )
@@ -117,7 +117,7 @@ def shown(ax: Axes, x: Array, title: str) -> None:
     """Show the image of a line that is at `x` [m] at its pixels."""
     height = pattern(x[None, :], np.linspace(0.0, 30e-6, PIXELS)[:, None])
     ax.imshow(height, cmap="afmhot", extent=(15.0, 45.0, 30.0, 0.0), vmin=0.0, vmax=1.1)
-    ax.set(title=title, xlabel="x [um]", ylabel="y [um]")
+    ax.set(title=title, xlabel="x [µm]", ylabel="y [µm]")
 
 
 if __name__ == "__main__":

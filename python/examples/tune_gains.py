@@ -1,6 +1,6 @@
 """Tuned gains beside the published ones of Xu and Li 2010, along the sine of Fig. 12 at 50 Hz.
 
-Run as ``python tune_gains.py [OUT]``. Writes the picture of docs/tuning.md, tuning.png: the error
+Run as ``python tune_gains.py [OUT]``. Writes the picture of docs/control.md, tuning.png: the error
 over time, and the margins that both keep at the highest gain of the stage.
 """
 
@@ -66,8 +66,8 @@ def main() -> None:
         goal=pt.Goal(largest_saturation=1.0),
     )
     print(found)
-    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
-    error, margins = figure.subplots(1, 2, width_ratios=(1.7, 1.0))
+    figure = Figure(figsize=(9.5, 3.8), layout="constrained")
+    error, margins = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
     for k, (name, loop) in enumerate(
         {"published gains": published, "tuned gains": found.controller}.items()
     ):
@@ -75,20 +75,20 @@ def main() -> None:
         rms = f"{1e6 * run.metrics.rms_error:.2f}"
         print(f"{name}: {run.metrics}")
         error.plot(
-            run.t, 1e6 * run.error, color=COLOURS[name], lw=0.9, label=f"{name}, rms {rms} um"
+            run.t, 1e6 * run.error, color=COLOURS[name], lw=0.9, label=f"{name}, rms {rms} µm"
         )
         bars(margins, pt.check_loop(stage, loop).high, name, k)
     error.axhline(0.0, color="0.6", lw=0.8, zorder=0)
-    error.set(xlabel="time [s]", ylabel="desired less measured [um]")
+    error.set(xlabel="time [s]", ylabel="desired less measured [µm]")
     error.legend(fontsize="small")
     for k in range(3):
         margins.plot([k - 0.45, k + 0.45], [1.0, 1.0], "k--", lw=1.0)
-    labels = ("gain margin\n(at least {:.3g} dB)", "phase margin\n(at least {:.3g} deg)")
+    labels = ("gain margin\n(at least {:.3g} dB)", "phase margin\n(at least {:.3g}°)")
     words = [one.format(bound) for one, bound in zip(labels, ASKED, strict=False)]
-    margins.set_xticks(range(3), [*words, f"Ms\n(at most {ASKED[2]:.3g})"], fontsize="x-small")
+    margins.set_xticks(range(3), [*words, f"Ms\n(at most {ASKED[2]:.3g})"], fontsize="small")
     highest = 1.1 * margins.get_ylim()[1]
-    margins.set(ylabel="as a multiple of what was asked for", ylim=(0.0, highest))
-    figure.savefig(out / "tuning.png", dpi=100)
+    margins.set(ylabel="multiple of the required value", ylim=(0.0, highest))
+    figure.savefig(out / "tuning.png", dpi=150)
 
 
 def bars(ax: Axes, loop: pt.control.LoopCheck, name: str, k: int) -> None:

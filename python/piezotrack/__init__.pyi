@@ -9,6 +9,7 @@ from . import references as references
 from . import stages as stages
 from . import xu_li_2010 as xu_li_2010
 from ._core import __version__ as __version__
+from ._support.display.look import figure_style as figure_style
 from .benchmarking.board import benchmark as benchmark
 from .benchmarking.record import BenchmarkRecord as BenchmarkRecord
 from .control.comparing.compare import compare_controllers as compare_controllers

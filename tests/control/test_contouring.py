@@ -310,7 +310,7 @@ def test_the_numbers_are_those_of_the_paper() -> None:
 def test_the_nine_circles_are_near_the_published_ones() -> None:
     """No circle is worse than published by half, and the order is the paper's.
 
-    What the paper's stage adds at higher frequencies is not on this stage: docs/paper.md.
+    What the paper's stage adds at higher frequencies is not on this stage: docs/evidence.md.
     """
     for case, run in zip(PUBLISHED, table().runs, strict=True):
         assert run.path.period == pytest.approx(1.0 / case.frequency)
@@ -345,7 +345,7 @@ def test_every_path_has_figures_words_and_a_picture(name: str) -> None:
     figure.canvas.draw()
     assert len(figure.axes) == 5
     for ax in figure.axes:
-        assert ax.get_ylabel().endswith("[um]")
+        assert ax.get_ylabel().endswith("[\N{MICRO SIGN}m]")
         low, high = ax.get_ylim()
         y = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in ax.lines])
         assert np.isfinite(y).all()
@@ -361,9 +361,9 @@ def test_the_table_has_words_and_a_picture() -> None:
     figure = table().plot()
     figure.canvas.draw()
     assert [ax.get_ylabel() for ax in figure.axes[2:]] == [
-        "peak to peak [um]",
-        "mean [um]",
-        "SD [um]",
+        "peak to peak [\N{MICRO SIGN}m]",
+        "mean [\N{MICRO SIGN}m]",
+        "SD [\N{MICRO SIGN}m]",
     ]
     plt.close(figure)
 

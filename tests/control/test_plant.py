@@ -286,7 +286,7 @@ def test_the_command_leads_the_model_itself(
         model=stage, offset=2e-6, offset_fitted=True, stroke=90e-6
     )
     model.save("model.json")
-    course = ("--reference", "sine:0.5Hz,20..60um,6s")
+    course = "sine:0.5Hz,20..60um,6s"
     loop_options = ("--online", "--dt", "0.002", "--limits", "0:75")
     printed = ran("track", "model.json", *course, *loop_options)
     found = float(printed.partition("from 2 s on: max ")[2].partition(" um")[0])

@@ -356,12 +356,6 @@ def test_refuses_what_is_not_there(tmp_path: Path) -> None:
         pt.read(None)  # type: ignore[arg-type]
 
 
-def test_refuses_a_spreadsheet(tmp_path: Path) -> None:
-    path = write(tmp_path, b"PK\x03\x04 sheet", "stage.xlsx")
-    with pytest.raises(pt.DataError, match=r"^stage\.xlsx: is a spreadsheet .* CSV"):
-        pt.read(path)
-
-
 def test_refuses_what_it_may_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(tmp_path, TEXT)
 

@@ -29,7 +29,7 @@ CURVE = {"time": T, "height (piezo)": 1e-6 * U, "height (measured)": 1e-6 * Y}
 
 @dataclass(frozen=True)
 class Kind:
-    """A format: its name on the page, the name of a file, how a sound one is written.
+    """A format: its name, the name of a file, how a sound one is written.
 
     `timed` says that it has a column of times, `library` and `extra` what reads it.
     """
@@ -65,6 +65,7 @@ KINDS = [
     Kind("HDF5", "log.h5", write.hdf5, library="h5py", extra="hdf5"),
     Kind("TDMS", "log.tdms", _tdms, timed=False, library="nptdms", extra="tdms"),
     Kind("Parquet", "log.parquet", write.parquet, library="pyarrow", extra="parquet"),
+    Kind("XLSX", "log.xlsx", write.xlsx, library="openpyxl", extra="xlsx"),
     Kind("MDF", "log.mf4", write.mdf, library="asammdf", extra="mdf"),
     Kind("AFM curves", "curve.tab", write.afm, library="afmformats", extra="afm"),
 ]

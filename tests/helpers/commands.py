@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from typer import testing
+from click import testing
 
 import piezotrack as pt
 from piezotrack.cli.advice import as_options, command_at_work
 from piezotrack.cli.commands import app
-from piezotrack.cli.models.identify import identify_command
+from piezotrack.cli.identify.identify import identify_command
 from piezotrack.data.log_file import write_log
 from records import BOX, HELD, quick
 
@@ -34,9 +34,6 @@ HEADING = (
     "from piezotrack.cli import main"
 )
 COMMAND = [sys.executable, "-c", f"{HEADING}; main()"]
-
-# The runner builds all commands anew for each call, which takes longer than most of the calls.
-testing._get_command = cache(testing._get_command)  # type: ignore[attr-defined]
 
 
 @cache

@@ -232,6 +232,19 @@ def parquet(path: Path, signals: Signals) -> Path:
     return path
 
 
+def xlsx(path: Path, signals: Signals) -> Path:
+    from itertools import zip_longest
+
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.append([titled(name, unit) for name, (_, unit) in signals.items()])
+    for row in zip_longest(*(values.tolist() for values, _ in signals.values())):
+        book.active.append(row)
+    book.save(path)
+    return path
+
+
 def mdf(
     path: Path,
     signals: Signals,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.integrate import solve_ivp
-from typer.testing import CliRunner
 
 import piezotrack as pt
 from piezotrack.cli.commands import app
@@ -374,7 +374,7 @@ def test_the_command_line_names_files_after_the_model(
     monkeypatch.chdir(tmp_path)
     given = "identify log.csv --model bouc-wen --fix exponent=1 --runs 1 --free damping,alpha"
     held = [f"--fix {n}={TRUE[n]}" for n in ("mass", "piezo_coefficient", "beta", "gamma")]
-    line = f"{given} --stiffness 19567 --out results {' '.join(held)}"
+    line = f"{given} --fix stiffness=19567 --out results {' '.join(held)}"
     result = CliRunner().invoke(app, line.split())
     assert result.exit_code == 0, result.stderr
     assert "Bouc-Wen: stage identified" in result.stdout

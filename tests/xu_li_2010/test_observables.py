@@ -181,6 +181,6 @@ def test_a_missing_log_is_named(tmp_path: Path) -> None:
 
 def test_the_command_refuses(tmp_path: Path) -> None:
     out = str(tmp_path / "report")
-    assert refusal("reproduce", "--seeds", "0", "--out", out) == "--seeds is 0: expected 1 to 1000"
+    assert refusal("reproduce", "--draws", "0", "--out", out) == "--draws is 0: expected 1 to 1000"
     assert "training.csv" in refusal("reproduce", "--dbo", str(tmp_path), "--out", out)
     assert not (tmp_path / "report").exists()

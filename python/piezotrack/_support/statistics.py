@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .display.table import words
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["FIGURES", "ErrorStatistics", "sample_noise"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class ErrorStatistics:
     """Statistics of a signed error.
 
@@ -50,6 +52,18 @@ class ErrorStatistics:
             With named fields.
         """
         return cls(**dict(zip(FIGURES, figures, strict=True)))
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}, {self}>"
+
+    def _repr_html_(self) -> str:
+        return words("Errors", self._rows()).html()
+
+    def _rows(self) -> list[tuple[str, str]]:
+        names = ("largest", "rms", "mean", "standard deviation", "peak to peak")
+        values = (getattr(self, name) for name in FIGURES)
+        return [(name, f"{1e6 * one:.4g} \N{MICRO SIGN}m")
+                for name, one in zip(names, values, strict=True)]  # fmt: skip
 
     def __str__(self) -> str:
         return f"max {1e6 * self.max_error:.3f} um, rms {1e6 * self.rms_error:.3f} um"

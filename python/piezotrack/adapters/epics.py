@@ -47,7 +47,7 @@ def serve_epics(
 ) -> None:
     """Publish a device over EPICS Channel Access until Ctrl-C; once in a process.
 
-    ==================  =====================================================================
+    =================== =====================================================================
     ``PREFIX:Voltage``  puts out a constant voltage [V]; beyond the limits it is refused
     ``PREFIX:Position`` displacement [um], ten times a second, where the device can be asked
     ``PREFIX:Table``    voltages of the next play [V]
@@ -56,7 +56,7 @@ def serve_epics(
     ``PREFIX:Record``   displacements of the last play [um], NaN where a sample was lost
     ``PREFIX:Status``   ``idle``, ``playing``, ``done`` or ``failed``
     ``PREFIX:Message``  the sentence of the last failure
-    ==================  =====================================================================
+    =================== =====================================================================
 
     From a failure of the device until it answers again, ``Voltage`` and ``Position`` have the
     severity ``INVALID``, ``Voltage`` is the last one that went out, and ``Message`` the first

@@ -13,13 +13,13 @@ __all__ = ["main"]
 def main() -> None:
     """Run the command with the arguments of the process."""
     try:
-        from . import interruption
+        from .process import interruption
 
         interruption.answer_signals()
     except KeyboardInterrupt:
         os.write(2, b"piezotrack: interrupted\n")
         os._exit(130)
-    from .terminal import prepare_streams
+    from .process.terminal import prepare_streams
 
     prepare_streams()
     try:

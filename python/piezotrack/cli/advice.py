@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import re
 from contextvars import ContextVar
-from inspect import signature
-from typing import TYPE_CHECKING, Any
-
-from typer.models import OptionInfo
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    import click
 
 __all__ = ["as_options", "command_at_work"]
 
 # Arguments whose option has another name.
 OPTIONS = {
+    "delay": "sensor_delay",
+    "rates": "frequencies",
+    "searches": "runs",
     "count": "plays",
     "dead_zones": "asymmetry",
     "factor": "decimate",
-    "largest_error": "allowed_um",
+    "goal.largest_error": "largest_error",
     "margins.gain": "gain_margin",
     "margins.phase": "phase_margin",
     "margins.sensitivity": "sensitivity",
@@ -43,6 +43,9 @@ REMEDIES = [
     (r"\bmissing='(drop|fill)'", r"--missing \1", "--missing"),
     (r"\bcreep=False", "--creep none", "--creep"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
+    (r"\bmethod='lifted'", "--from-rest", "--from-rest"),
+    (r"\bseeds(?= is\b)", "--draws", "--draws"),
+    (r"\breference=(?=,)", "REFERENCE", "--to"),
     # An option of the commands that come after `info`.
     (r"\bfit\.zeroed\(\)", "--zero", "--zero"),
     (r"\boffset=pt\.zero\(stage\)", "--zero", "--zero"),
@@ -62,7 +65,7 @@ IN_THE_HEADER = [
 # An argument in a sentence or a table, as "runs=4", "model='dahl'" or "unstable=True".
 ARGUMENT = re.compile(r"(?<![\w'(?{&,])(?<!has )(?<!--unit )(\w+)=(?!\.)(?:True\b|'([\w-]+)'|) ?")
 
-command_at_work: ContextVar[Callable[..., Any] | None] = ContextVar("_command", default=None)
+command_at_work: ContextVar[click.Command | None] = ContextVar("_command", default=None)
 
 
 def as_options(error: object) -> str:
@@ -79,19 +82,14 @@ def as_options(error: object) -> str:
         The same; what the command at work has no option for is left in Python's words.
     """
     command = command_at_work.get()
-    arguments = {} if command is None else signature(command, eval_str=True).parameters
-    known = {
-        _option(name)
-        for name, one in arguments.items()
-        if any(isinstance(info, OptionInfo) for info in getattr(one.annotation, "__metadata__", ()))
-    }
+    known = {name for one in command.params for name in one.opts} if command else set()
 
     def in_options(match: re.Match[str]) -> str:
-        option = _option(match[1])
+        option = _option(match[1], known)
         return f"{option} {match[2] or ''}" if option in known else match[0]
 
     text, argument = str(error), getattr(error, "argument", None) or ""
-    if (option := _option(argument)) in known:
+    if (option := _option(argument, known)) in known:
         text = re.sub(rf"(^|: ){re.escape(argument)}(?=[ [])", rf"\1{option}", text, count=1)
     if not known & {"--displacement", "--drive"}:
         for python, words in IN_THE_HEADER:
@@ -112,5 +110,7 @@ def as_options(error: object) -> str:
     return re.sub(r"(--[a-z-]+) (?=[,;:)\n]|\.(?:\s|$)|$)", r"\1", text)
 
 
-def _option(argument: str) -> str:
-    return f"--{OPTIONS.get(argument, argument)}".replace("_", "-")
+def _option(argument: str, known: set[str]) -> str:
+    """Return the option of an argument: of its other name, where the command has that."""
+    option = f"--{OPTIONS.get(argument, argument)}".replace("_", "-")
+    return option if option in known else f"--{argument}".replace("_", "-")

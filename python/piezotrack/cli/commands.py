@@ -1,77 +1,161 @@
-"""The commands of ``piezotrack``, and the options of ``piezotrack`` itself."""
+"""The commands of ``piezotrack`` by heading, each imported when it is called."""
 
 from __future__ import annotations
 
 import sys
-from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Annotated, Any
+from importlib import import_module
+from typing import Any
 
-import matplotlib as mpl
-import typer
-from typer.core import TyperCommand, TyperGroup
+import click
 
 from .. import __version__
-from .demonstrations.demo import demo_command
-from .demonstrations.reproduce import reproduce_command
-from .devices.measure import measure_command
-from .devices.serve import serve_command
-from .error_messages import of_the_system
-from .logs.convert import convert_command
-from .logs.info import info_command
-from .loops.compare_controllers import compare_controllers_command
-from .loops.contour import contour_command
-from .loops.export import export_command
-from .loops.learn import learn_command
-from .loops.play import play_command
-from .loops.track import feedforward_command, track_command
-from .loops.tune import tune_command
-from .models.benchmark import benchmark_command
-from .models.campaign import campaign_command
-from .models.compare import compare_command
-from .models.identify import identify_command
-from .models.noise import noise_command
-from .models.simulate import simulate_command
-from .models.step import step_command
-from .models.suggest import suggest_command
-from .models.watch import watch_command
+from ..errors import PiezotrackError
+from .command import command
+from .error_messages import of_the_system, say
+from .help_page import coloured_help, list_page
+from .values import named, nearest
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+__all__ = ["COMMANDS", "app", "run"]
 
-__all__ = ["app", "run"]
-
-# No window is ever opened.
-mpl.use("Agg")
-
-# Entry points of other packages: functions with options of Typer, as the commands here.
+# The heading is the folder of the command.
+HEADINGS = {
+    "data": ("info", "convert", "noise"),
+    "identify": ("identify", "compare", "step", "campaign", "watch", "suggest"),
+    "control": ("simulate", "feedforward", "track", "tune", "learn", "contour", "export"),
+    "device": ("measure", "play", "serve"),
+    "research": ("demo", "compare-controllers", "benchmark", "reproduce"),
+}
+COMMANDS = {name: heading for heading, names in HEADINGS.items() for name in names}
+# Entry points of other packages: a command of click, or a function as `command` takes it.
 GROUP = "piezotrack.commands"
+END = """\
+`piezotrack demo` shows an identification and a loop; `piezotrack COMMAND --help` shows the options
+of a command. Values have units: 20ms, 1kHz, 65nm, 0:75V, 3s:15s. Completion of words:
+  eval "$(_PIEZOTRACK_COMPLETE=bash_source piezotrack)"    (or zsh_source, fish_source)"""
 
 
-class Commands(TyperGroup):
+class Commands(click.Group):
     """The commands of the package, and those that other packages declare."""
 
-    def list_commands(self, ctx: Any) -> list[str]:
+    def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names, those of other packages last."""
-        own = super().list_commands(ctx)
-        return [*own, *sorted(entry_points(group=GROUP).names - set(own))]
+        del ctx
+        return [*COMMANDS, *sorted(_others() - set(COMMANDS))]
 
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Return a command; one of the package is never replaced."""
-        if (own := super().get_command(ctx, cmd_name)) is not None:
-            return own
-        for entry in entry_points(group=GROUP, name=cmd_name):
-            other = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
-            other.command(cmd_name, cls=Command)(entry.load())
-            return typer.main.get_command(other)
-        return None
+        del ctx
+        if cmd_name in self.commands:
+            return self.commands[cmd_name]
+        name = cmd_name.replace("-", "_")
+        if cmd_name in COMMANDS:
+            module = import_module(f".{COMMANDS[cmd_name]}.{name}", __package__)
+            found: click.Command = getattr(module, f"{name}_command")
+        elif cmd_name in _others():
+            from importlib.metadata import entry_points
+
+            (entry,) = entry_points(group=GROUP, name=cmd_name)
+            loaded = entry.load()
+            found = loaded if isinstance(loaded, click.Command) else command()(loaded)
+        else:
+            return None
+        found.name = cmd_name
+        if cmd_name in COMMANDS:
+            self.commands[cmd_name] = found
+        return found
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command of the arguments."""
+        if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            near = nearest(args[0], self.list_commands(ctx))
+            raise click.UsageError(f"there is no command '{args[0]}'{near}", ctx)
+        return super().resolve_command(ctx, args)
+
+    def get_help(self, ctx: click.Context) -> str:
+        """Return the list of all commands as plain text."""
+        names = self.list_commands(ctx)
+        sections: dict[str, list[tuple[str, str]]] = {title: [] for title in HEADINGS}
+        for name in names:
+            one = self.get_command(ctx, name)
+            title = COMMANDS.get(name, "other packages")
+            sections.setdefault(title, []).append((name, (one and one.short_help) or ""))
+        usage = "Usage: piezotrack [--version] [--help] COMMAND ..."
+        return list_page(usage, self.help or "", sections, END)
+
+    def get_help_option(self, ctx: click.Context) -> click.Option | None:
+        """Return ``--help``, which prints in colour where the terminal has it."""
+        return coloured_help(super().get_help_option(ctx))
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run; what is typed wrongly is answered by one sentence."""
+        extra["standalone_mode"] = False
+        try:
+            code = super().main(*args, **extra)
+        except click.exceptions.NoArgsIsHelpError as error:
+            print(error.ctx.get_help())
+            code = 2
+        except click.UsageError as error:
+            say(_sentence(error))
+            code = 2
+        except PiezotrackError as error:
+            say(str(error))
+            code = 2
+        raise SystemExit(code if isinstance(code, int) else 0)
 
 
-app = typer.Typer(
-    cls=Commands,
-    help="Hysteresis identification and tracking control of piezo nanopositioners.",
+def _others() -> set[str]:
+    from importlib.metadata import entry_points
+
+    return set(entry_points(group=GROUP).names)
+
+
+def _sentence(error: click.UsageError) -> str:
+    """Write an error of click as those of the library are."""
+    where = f"; see {error.ctx.command_path} --help" if error.ctx else ""
+    if isinstance(error, click.NoSuchOption):
+        names = (
+            [name for one in error.ctx.command.params for name in one.opts if name[0] == "-"]
+            if error.ctx
+            else []
+        )
+        near = nearest(error.option_name, names)
+        return f"there is no option {error.option_name}{near or where}"
+    if isinstance(error, click.MissingParameter) and error.param is not None:
+        is_option = error.param.param_type_name == "option"
+        name = error.param.opts[0] if is_option else named(error.param)
+        return f"{name} is missing: expected {_first(error.param)}{where}"
+    message = error.format_message().rstrip(".")
+    return f"{message[:1].lower()}{message[1:]}{'' if 'did you mean' in message else where}"
+
+
+def _first(param: Any) -> str:
+    text = (param.help or "a value").partition(";")[0].partition(". ")[0]
+    return text[:1].lower() + text[1:] if not text[:2].isupper() else text
+
+
+def _version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    del param
+    if value and not ctx.resilient_parsing:
+        print(f"piezotrack {__version__}")
+        ctx.exit()
+
+
+app = Commands(
+    "piezotrack",
+    help="From a log of a piezo nanopositioner to a model of its hysteresis, and to control.",
     no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
+    params=[
+        click.Option(
+            ["--version"],
+            is_flag=True,
+            is_eager=True,
+            expose_value=False,
+            callback=_version,
+            help="Print the version.",
+        )
+    ],
 )
 
 
@@ -79,65 +163,9 @@ def run() -> None:
     """Run the command with the arguments of the process."""
     try:
         try:
-            app()
+            app(prog_name="piezotrack")
         finally:
             sys.stdout.flush()
     except OSError as error:
         # The help or the version cannot be printed.
         raise SystemExit(of_the_system(error)) from None
-
-
-def _version(requested: bool) -> None:
-    if requested:
-        print(f"piezotrack {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """Declare the options of the command itself."""
-
-
-class Command(TyperCommand):
-    """A command whose usage shows the names of its arguments as its help does."""
-
-    def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Write FILE and [MODEL] in place of {FILE} and [[MODEL]]."""
-        pieces = super().collect_usage_pieces(ctx)
-        table = {"{": "", "}": "", "[[": "[", "]]": "]"}
-        for typed, shown in table.items():
-            pieces = [piece.replace(typed, shown) for piece in pieces]
-        return pieces
-
-
-COMMANDS: dict[str, Callable[..., None]] = {
-    "measure": measure_command,
-    "info": info_command,
-    "convert": convert_command,
-    "identify": identify_command,
-    "compare": compare_command,
-    "benchmark": benchmark_command,
-    "campaign": campaign_command,
-    "watch": watch_command,
-    "suggest": suggest_command,
-    "step": step_command,
-    "simulate": simulate_command,
-    "feedforward": feedforward_command,
-    "track": track_command,
-    "play": play_command,
-    "tune": tune_command,
-    "export": export_command,
-    "learn": learn_command,
-    "compare-controllers": compare_controllers_command,
-    "contour": contour_command,
-    "noise": noise_command,
-    "serve": serve_command,
-    "reproduce": reproduce_command,
-    "demo": demo_command,
-}
-for name, command in COMMANDS.items():
-    app.command(name, cls=Command)(command)

@@ -10,18 +10,19 @@ from contextlib import suppress
 from functools import wraps
 from typing import TYPE_CHECKING, ParamSpec
 
-import typer
+import click
 
 from .._support.display.progress_bar import one_clock
 from ..errors import PiezotrackError
 from .advice import as_options, command_at_work
-from .interruption import at_rest, at_work, exit_code, stopped
-from .terminal import one_line
+from .process.interruption import at_rest, at_work, exit_code, stopped
+from .process.pictures import prepare_pictures
+from .process.terminal import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-__all__ = ["of_the_system", "report_errors"]
+__all__ = ["of_the_system", "report_errors", "say"]
 
 BAD_INPUT = 2
 NOT_PRINTED = 1
@@ -41,8 +42,10 @@ def report_errors(command: Callable[P, None]) -> Callable[P, None]:
 
     @wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
-        command_at_work.set(command)
+        context = click.get_current_context(silent=True)
+        command_at_work.set(context.command if context else None)
         try:
+            prepare_pictures()
             with at_work(), one_clock():
                 command(*args, **kwargs)
                 sys.stdout.flush()
@@ -53,10 +56,10 @@ def report_errors(command: Callable[P, None]) -> Callable[P, None]:
                 # A module that was being imported has turned the interruption into another error.
                 code = _stopped(KeyboardInterrupt())
             elif isinstance(error, PiezotrackError):
-                _say(as_options(error))
+                say(as_options(error))
                 code = BAD_INPUT
             elif isinstance(error, MemoryError):
-                _say(str(error) or "not enough memory")
+                say(str(error) or "not enough memory")
                 code = BAD_INPUT
             elif isinstance(error, OSError):
                 code = of_the_system(error)
@@ -64,12 +67,19 @@ def report_errors(command: Callable[P, None]) -> Callable[P, None]:
                 raise
         else:
             return
-        raise typer.Exit(code)
+        raise click.exceptions.Exit(code)
 
     return run
 
 
-def _say(sentence: str) -> None:
+def say(sentence: str) -> None:
+    """Print one sentence on stderr.
+
+    Parameters
+    ----------
+    sentence : str
+        Of an error.
+    """
     # There is nowhere to say that it cannot be said.
     with suppress(OSError):
         print(f"piezotrack: {one_line(sentence)}", file=sys.stderr, flush=True)
@@ -78,7 +88,7 @@ def _say(sentence: str) -> None:
 def _stopped(error: KeyboardInterrupt) -> int:
     at_rest()
     # A codec at work puts what interrupts it into a sentence of its own.
-    _say(CODEC.sub(r"\1", str(error)) or "interrupted")
+    say(CODEC.sub(r"\1", str(error)) or "interrupted")
     return exit_code()
 
 
@@ -97,7 +107,7 @@ def of_the_system(error: OSError) -> int:
     """
     reason = (error.strerror or str(error)).lower()
     if error.filename is not None:
-        _say(f"{error.filename}: {reason}")
+        say(f"{error.filename}: {reason}")
         return BAD_INPUT
     # Without a file it is the output, printed when all results have been written. The rest of it is
     # discarded, or Python would report an error when it exits.
@@ -105,5 +115,5 @@ def of_the_system(error: OSError) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     if isinstance(error, BrokenPipeError):
         return READER_LEFT
-    _say(f"cannot print: {reason}" if error.errno in OUTPUT else reason)
+    say(f"cannot print: {reason}" if error.errno in OUTPUT else reason)
     return NOT_PRINTED

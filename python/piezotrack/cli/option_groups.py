@@ -2,123 +2,166 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass
-from functools import wraps
-from inspect import Parameter, Signature, signature
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from .options import (
-    Decimate,
-    DisplacementColumn,
-    DriveColumn,
-    HoldOption,
-    Interval,
-    MissingOption,
-    Resample,
-    TimeColumn,
-    Units,
-    Zero,
-    column,
-    of_file,
-    pairs,
-)
+from ..errors import ParameterError
+from .command import Option, group
+from .options import Duration, Period, column, of_file, pairs
+from .values import FREQUENCY, LOOP_TIME, TIME
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
     from pathlib import Path
 
-    from ..data.dataset import Dataset, Hold
-    from ..data.missing import Missing
+    from ..data.dataset import Dataset
+    from ..references.reference import Reference
 
-__all__ = ["Columns", "HeldLogOptions", "LogOptions", "with_groups"]
+__all__ = [
+    "Columns",
+    "DisplacementColumns",
+    "DriveColumns",
+    "LogOptions",
+    "Motion",
+    "Rate",
+    "Sampling",
+    "interval",
+]
 
-
-def with_groups(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of its groups, in the place of the argument that takes them."""
-    arguments = signature(command, eval_str=True).parameters.values()
-    groups: dict[str, Any] = {
-        argument.name: argument.annotation
-        for argument in arguments
-        if is_dataclass(argument.annotation)
-    }
-
-    @wraps(command)
-    def run(**options: Any) -> None:
-        for name, group in groups.items():
-            options[name] = group(**{of.name: options.pop(of.name) for of in fields(group)})
-        command(**options)
-
-    expanded = [option for argument in arguments for option in _options_of(argument)]
-    vars(run)["__signature__"] = Signature(expanded)
-    run.__annotations__ = {option.name: option.annotation for option in expanded}
-    return run
+Rate = Annotated[float | None, Option("Sampling rate", FREQUENCY)]
 
 
-def _options_of(argument: Parameter) -> Iterator[Parameter]:
-    group = argument.annotation
-    if not is_dataclass(group):
-        yield argument.replace(kind=Parameter.KEYWORD_ONLY)
-        return
-    hints = get_type_hints(group, include_extras=True)
-    for of in fields(group):
-        default, hint = of.default, hints[of.name]
-        yield Parameter(of.name, Parameter.KEYWORD_ONLY, default=default, annotation=hint)
+def interval(dt: float | None, rate: float | None) -> float | None:
+    """Return the sampling interval that one of two options gives [s]."""
+    if dt is not None and rate is not None:
+        raise ParameterError("--dt and --rate: expected one of them at most, both are given")
+    if rate is None:
+        return dt
+    if not rate > 0.0:
+        raise ParameterError("--rate", f"{rate:g} Hz", "a rate above 0 Hz")
+    return 1.0 / rate
 
 
-@dataclass(frozen=True, kw_only=True)
-class Columns:
-    """Columns of a log by the options that name them; a number counts from 0."""
+@group
+class Sampling:
+    """Sampling."""
 
-    time: TimeColumn = None
-    drive: DriveColumn = None
-    displacement: DisplacementColumn = None
-    unit: Units = None
-    dt: Interval = None
+    dt: Annotated[float | None, Option("Sampling interval, or rate", LOOP_TIME)] = None
+    rate: Rate = None
+
+    @property
+    def interval(self) -> float | None:
+        """Sampling interval [s]."""
+        return interval(self.dt, self.rate)
+
+
+@group
+class _Columns:
+    time: Annotated[
+        str | None, Option("Column of the time; default by title", metavar="COLUMN")
+    ] = None
+    unit: Annotated[
+        list[str] | None,
+        Option(
+            "Unit of a column, or of time, drive, displacement. Repeatable", metavar="NAME=UNIT"
+        ),
+    ] = None
+    dt: Annotated[float | None, Option("Sampling interval; default by times", LOOP_TIME)] = None
+    rate: Rate = None
 
     @property
     def arguments(self) -> dict[str, Any]:
         """Arguments of the functions that read a log, those that are given."""
         units = {column(name) or name: text for name, text in pairs("--unit", self.unit)}
         names = ("time", "drive", "displacement")
-        columns = {name: column(getattr(self, name)) for name in names}
-        given = {**columns, "units": units, "dt": self.dt}
-        return {name: value for name, value in given.items() if value is not None}
+        columns = {name: column(getattr(self, name, None)) for name in names}
+        given = {**columns, "units": units, "dt": interval(self.dt, self.rate)}
+        return {name: value for name, value in given.items() if value not in (None, {})}
 
-    def read(
-        self,
-        file: Path,
-        hold: Hold,
-        resample: float | None = None,
-        missing: Missing = None,
-        decimate: int | None = None,
-    ) -> Dataset:
-        """Read a log with these columns."""
+
+@group
+class DriveColumns(_Columns):
+    """Log."""
+
+    drive: Annotated[
+        str | None, Option("Column of the drive; default by title", metavar="COLUMN")
+    ] = None
+
+
+@group
+class DisplacementColumns(_Columns):
+    """Log."""
+
+    displacement: Annotated[
+        str | None, Option("Column of the displacement; default by title", metavar="COLUMN")
+    ] = None
+
+
+@group
+class Columns(DriveColumns, DisplacementColumns):
+    """Log."""
+
+    missing: Annotated[
+        Literal["drop", "fill"] | None,
+        Option("Missing readings (NaN): left out, or interpolated; default refused"),
+    ] = None
+
+
+@group
+class LogOptions(Columns):
+    """Log."""
+
+    hold: Annotated[Literal["foh", "zoh"], Option("Drive between samples: linear or constant")] = (
+        "foh"
+    )
+    resample: Annotated[
+        float | None, Option("Interpolate to this interval, for gaps or jitter; default not", TIME)
+    ] = None
+    decimate: Annotated[
+        str | None,
+        Option(
+            "Every Nth sample, low-pass filtered; auto: as `info` advises; default all",
+            metavar="N|auto",
+        ),
+    ] = None
+    zero: Annotated[bool, Option("Displacements less the sensor's initial reading")] = False
+
+    def log(self, file: Path) -> Dataset:
+        """Read a log."""
         from ..data.reader import read
 
-        log = read(file, **self.arguments, resample=resample, hold=hold, missing=missing)
-        if decimate in (None, 1):
-            return log
-        with of_file(file):
-            return log.decimate(decimate)
-
-
-@dataclass(frozen=True, kw_only=True)
-class LogOptions(Columns):
-    """Columns of a log, and what is done to its samples."""
-
-    resample: Resample = None
-    decimate: Decimate = None
-    zero: Zero = False
-    missing: MissingOption = None
-
-    def log(self, file: Path, hold: Hold = "foh") -> Dataset:
-        """Read a log."""
-        log = self.read(file, hold, self.resample, self.missing, self.decimate)
+        log = read(
+            file,
+            **self.arguments,
+            resample=self.resample,
+            hold=self.hold,
+            missing=self.missing,
+        )
+        if (factor := self._factor(log)) != 1:
+            with of_file(file):
+                log = log.decimate(factor)
         return log.zeroed() if self.zero else log
 
+    def _factor(self, log: Dataset) -> int:
+        from ..data.checks.sampling_rate import spare_factor
 
-@dataclass(frozen=True, kw_only=True)
-class HeldLogOptions(LogOptions):
-    """Columns of a log, what is done to its samples, and the drive between them."""
+        if self.decimate in (None, "auto"):
+            return 1 if self.decimate is None else spare_factor(log.u, log.dt)
+        try:
+            return int(self.decimate or 1)
+        except ValueError:
+            raise ParameterError(
+                "--decimate", f"'{self.decimate}'", "a whole number, or auto", verb="has"
+            ) from None
 
-    hold: HoldOption = "foh"
+
+@group
+class Motion:
+    """Motion."""
+
+    duration: Duration = None
+    period: Period = None
+
+    def of(self, text: str) -> Reference:
+        """Read the motion from a file if the text names one, else parse the text."""
+        from ..references.parse import reference_of
+
+        return reference_of(text, duration=self.duration, period=self.period)

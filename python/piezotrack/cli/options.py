@@ -1,147 +1,127 @@
-"""Options that several commands share, and the parsing of their values."""
+"""Options and arguments that several commands have, and the parsing of their values."""
 
 from __future__ import annotations
 
-import os
 import shlex
 from contextlib import contextmanager
 from pathlib import Path
-from string import ascii_letters
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
-import typer
+import click
 
 from ..errors import ParameterError, PiezotrackError
-from .terminal import one_line
+from .command import Argument, Option
+from .values import DRIVE, FREQUENCY, LENGTH, LOOP_TIME, TIME, VOLTAGE, Ranged
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
+    from typing import TypeAlias
 
     from ..data.dataset import Dataset
 
+    Span: TypeAlias = tuple[float | None, float | None]
+
 __all__ = [
-    "ControlInterval",
-    "Decimate",
-    "DisplacementColumn",
-    "DriveColumn",
+    "WINDOW",
+    "Bandwidth",
+    "Delay",
+    "DeviceAddress",
     "Duration",
-    "HoldOption",
-    "Interval",
-    "Jitter",
-    "Json",
+    "Limits",
     "LogFile",
-    "MissingOption",
     "ModelFile",
-    "Out",
-    "OutFile",
+    "Noise",
+    "OnDevice",
     "Overwrite",
     "Period",
-    "Quiet",
-    "Resample",
-    "Seconds",
-    "TimeColumn",
-    "Units",
+    "Reference",
+    "Rest",
+    "Seed",
+    "Sensitivity",
+    "TestLog",
+    "TestWindow",
+    "Threads",
+    "Window",
+    "Windows",
     "Zero",
-    "can_be_folder",
-    "can_be_written",
     "column",
     "command_line",
-    "list_files",
+    "cut",
     "number",
-    "number_range",
     "of_file",
+    "of_voltage",
     "pairs",
-    "refuse_without_effect",
-    "seconds",
-    "windowed",
 ]
 
-Seconds = Annotated[
-    str | None,
-    typer.Option(
-        metavar="A:B",
-        help="Seconds to use, default all; the drive before A is simulated as warm-up.",
+WINDOW = Ranged(TIME, "A:B", open=True)
+
+LogFile = Annotated[Path, Argument("Log: CSV, MAT, HDF5, TDMS, NPZ and others", "FILE")]
+ModelFile = Annotated[Path, Argument("Model file in JSON, as `identify` writes it", "MODEL")]
+Reference = Annotated[
+    str,
+    Argument(
+        "Motion: sine:0.2Hz,0..110um, triangle:, staircase:, chirp:, multisine:, or a CSV file "
+        "with time and displacement",
+        "REFERENCE",
     ),
 ]
-TimeColumn = Annotated[
-    str | None, typer.Option(metavar="COLUMN", help="Column of the time; default by its title.")
+Window = Annotated[
+    tuple[float | None, float | None] | None,
+    Option("Part of the log that is used, as 3s:15s; default all", WINDOW),
 ]
-DriveColumn = Annotated[
-    str | None, typer.Option(metavar="COLUMN", help="Column of the drive; default by its title.")
-]
-DisplacementColumn = Annotated[
-    str | None,
-    typer.Option(metavar="COLUMN", help="Column of the displacement; default by its title."),
-]
-Units = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--unit",
-        metavar="NAME=UNIT",
-        help="Unit of a column, or of time, drive, displacement; default as in its title. "
-        "Repeatable.",
+Windows = Annotated[
+    list[tuple[float | None, float | None]] | None,
+    Option(
+        "Part of the log that is used, as 3s:15s; default all. Once, or once for each log", WINDOW
     ),
 ]
-Interval = Annotated[
-    float | None, typer.Option(help="Sampling interval in s; default from the column of the time.")
-]
-Resample = Annotated[
-    float | None,
-    typer.Option(
-        help="Put a log with gaps or jitter on even times, at this interval in s; default not."
-    ),
-]
-Decimate = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        help="Every Nth sample of the log, after a low-pass filter without lag over all signals; "
-        "for one sampled far above what moves (see `info`), not for steps. Default all.",
-    ),
-]
-MissingOption = Annotated[
-    Literal["drop", "fill"] | None,
-    typer.Option(
-        help="Missing readings (NaN): left out of what is fitted and judged (drop) or on straight "
-        "lines (fill); default refused."
-    ),
-]
-HoldOption = Annotated[
-    Literal["foh", "zoh"],
-    typer.Option(help="Drive between samples: linear (foh) or constant (zoh)."),
-]
-ControlInterval = Annotated[float, typer.Option(help="Sampling interval of the controller in s.")]
-Jitter = Annotated[float, typer.Option(help="Mean sampling jitter in s (truncated exponential).")]
-Duration = Annotated[
-    float | None, typer.Option(help="Length of the reference in s; default as the reference says.")
-]
-Period = Annotated[
-    float | None,
-    typer.Option(help="Time in s after which a reference from a file repeats; default never."),
+TestLog = Annotated[Path | None, Option("Log for the test only; default FILE", metavar="FILE")]
+TestWindow = Annotated[
+    tuple[float | None, float | None] | None,
+    Option("Part of the log for the test, which is not fitted", WINDOW),
 ]
 Zero = Annotated[
     bool,
-    typer.Option(
-        "--zero",
-        help="Displacements from the beginning of the record on: less what its sensor reads there, "
-        "before the drive moves. Of a device or another stage, from where it is at rest. Default "
-        "as recorded.",
+    Option(
+        "Count displacements from the initial sensor reading, before the drive moves; of a device "
+        "or another stage, from its rest"
     ),
 ]
-Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that exist.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the figures as one JSON document.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
-LogFile = Annotated[
-    Path,
-    typer.Argument(
-        metavar="FILE", help="Log: CSV, MAT, HDF5, TDMS, NPZ and others, with its units."
+Limits = Annotated[
+    tuple[float, float] | None,
+    Option(
+        "Lowest and highest drive, as 0:75V; default those of the record identified",
+        Ranged(DRIVE, "LOW:HIGH"),
     ),
 ]
-OutFile = Annotated[
-    Path, typer.Argument(metavar="OUT", help="File to write: .csv, .npz, .mat or .parquet.")
+Duration = Annotated[
+    float | None, Option("Length of the motion; default that of its text or file", TIME)
 ]
-ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file in JSON.")]
+Period = Annotated[
+    float | None, Option("Time after which a motion from a file repeats; default never", TIME)
+]
+Noise = Annotated[float, Option("Noise of the simulated sensor, rms, as 20nm", LENGTH)]
+Bandwidth = Annotated[float, Option("Bandwidth of the simulated amplifier", FREQUENCY)]
+Delay = Annotated[float, Option("Delay of the loop in addition to the hold", LOOP_TIME)]
+Overwrite = Annotated[bool, Option("Replace results that exist")]
+Seed = Annotated[int, Option("Seed of the random numbers")]
+Sensitivity = Annotated[float, Option("Largest sensitivity Ms")]
+Threads = Annotated[int | None, Option("Threads, up to 256; default all cores")]
+DeviceAddress = Annotated[
+    str,
+    Option(
+        "Device over TCP: gcs://HOST, scpi://HOST:PORT?unit=um&limits=0..75V; a card: "
+        "ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V; simulated: virtual: or "
+        "virtual:MODEL.json",
+        metavar="ADDRESS",
+    ),
+]
+OnDevice = Annotated[
+    str | None, Option("Device in place of the simulated stage, as of `measure`", metavar="ADDRESS")
+]
+Rest = Annotated[
+    float | None, Option("Drive before and after; default 0 V, or the limit nearest to it", VOLTAGE)
+]
 
 
 def column(text: str | None) -> str | int | None:
@@ -149,32 +129,31 @@ def column(text: str | None) -> str | int | None:
     return int(text) if text is not None and text.isdecimal() else text
 
 
-def command_line(context: typer.Context) -> str:
+def command_line() -> str:
     """Write the command with the arguments and options that were given, for a shell."""
+    context = click.get_current_context()
     words = [context.command_path]
     for parameter in context.command.params:
         source = context.get_parameter_source(parameter.name or "")
         if source is None or source.name != "COMMANDLINE":
             continue
         value = context.params[parameter.name or ""]
-        values = value if isinstance(value, (list, tuple)) else [value]
-        for one in values:
+        many = parameter.multiple or parameter.nargs == -1
+        for one in value if many else [value]:
             if parameter.param_type_name == "argument":
                 words.append(shlex.quote(str(one)))
             elif isinstance(one, bool):
                 words.append((parameter.opts if one else parameter.secondary_opts)[0])
             else:
-                words += [parameter.opts[0], shlex.quote(str(one))]
+                words += [parameter.opts[0], shlex.quote(_typed(one))]
     return " ".join(words)
 
 
-def refuse_without_effect(context: typer.Context, options: Iterable[str], reason: str) -> None:
-    """Refuse options that were given although they have no effect; `reason` says beside what."""
-    for name in options:
-        source = context.get_parameter_source(name)
-        if source is not None and source.name != "DEFAULT":
-            option = f"--{name.replace('_', '-')}"
-            raise ParameterError(option, f"no effect {reason}", "it left out", verb="has")
+def _typed(value: object) -> str:
+    """Write a value as it can be typed again."""
+    if isinstance(value, tuple):
+        return ":".join("" if one is None else f"{one:.12g}" for one in value)
+    return f"{value:.12g}" if isinstance(value, float) else str(value)
 
 
 @contextmanager
@@ -186,68 +165,28 @@ def of_file(file: Path) -> Iterator[None]:
         raise error.of(file.name) from None
 
 
-def can_be_folder(out: Path) -> None:
-    """Refuse a folder that cannot be written to before the computation begins."""
-    there = out
-    try:
-        while not there.exists() and there != there.parent:
-            there = there.parent
-        is_folder = there.is_dir()
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise ParameterError(f"--out: {out} cannot be made a folder: {reason}") from None
-    if not is_folder:
-        raise ParameterError(f"--out: {out} cannot be made a folder: {there} is a file")
-    if not os.access(there, os.W_OK | os.X_OK):
-        raise ParameterError(f"--out: {there} cannot be written to: permission denied")
-
-
-def can_be_written(out: Path, names: Iterable[str], *, overwrite: bool) -> None:
-    """Refuse a folder that cannot be written to, or that has a result, before the computation."""
-    can_be_folder(out)
-    for path in [] if overwrite else [out / name for name in names]:
-        if path.exists():
-            raise ParameterError(f"{path} exists: expected --overwrite, or another --out")
-
-
-def list_files(written: Iterable[Path]) -> None:
-    """Print which files were written, if any were."""
-    files = list(written)
-    if files:
-        print("\nwritten")
-    for path in files:
-        print(f"  {one_line(str(path))}")
-
-
-def seconds(option: str, text: str) -> tuple[float | None, float | None]:
-    """Parse A:B in seconds; either end may be left out."""
-    start, colon, stop = text.partition(":")
-    if not colon:
-        raise ParameterError(option, f"'{text}'", "A:B in seconds, as 3:23")
-    first, last = (_in_seconds(option, end) if end else None for end in (start, stop))
-    return first, last
-
-
-def _in_seconds(option: str, text: str) -> float:
-    """Parse a time with or without its unit [s]."""
-    from .._support.units import lookup
-
-    plain = text.rstrip(ascii_letters)
-    unit = lookup(text[len(plain) :]) if plain != text else None
-    if unit is None or unit.quantity != "time":
-        return number(option, text)
-    return number(option, plain) * unit.factor / unit.divisor
-
-
-def windowed(log: Dataset, file: Path, option: str, window: str | None) -> Dataset:
+def cut(
+    log: Dataset,
+    file: Path,
+    window: Span | None,
+    option: str = "--window",
+) -> Dataset:
     """Cut a log to the window of an option; without one the whole log is used."""
     if window is None:
         return log
-    start, stop = seconds(option, window)
     try:
-        return log[start:stop]
+        return log[slice(*window)]
     except ParameterError as error:
-        raise error.of(f"{file.name}: {option} {window}") from None
+        raise error.of(f"{file.name}: {option} {_typed(window)}") from None
+
+
+def of_voltage(option: str, limits: tuple[float, float]) -> tuple[float, float]:
+    """Return the limits of a drive in V; those in another unit are refused."""
+    for one in limits:
+        unit = getattr(one, "unit", "")
+        if unit not in ("", "V", "mV", "kV"):
+            raise ParameterError(option, f"in {unit}", "voltages, as 0:75V")
+    return limits
 
 
 def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
@@ -264,16 +203,8 @@ def pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
 
 
 def number(option: str, text: str, expected: str = "a number") -> float:
-    """Parse a number; `expected` says what else the option takes."""
+    """Parse a number without a unit; `expected` says what else the option takes."""
     try:
         return float(text)
     except ValueError:
         raise ParameterError(option, f"'{text}'", expected, verb="has") from None
-
-
-def number_range(option: str, text: str) -> tuple[float, float]:
-    """Parse LOW:HIGH."""
-    low, colon, high = text.partition(":")
-    if not colon:
-        raise ParameterError(option, f"'{text}'", "LOW:HIGH", verb="has")
-    return number(option, low), number(option, high)

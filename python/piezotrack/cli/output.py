@@ -7,17 +7,26 @@ import os
 import re
 import sys
 import textwrap
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, Any
 
 from ..errors import ParameterError
 from .advice import as_options
-from .options import can_be_written, list_files
+from .command import Option, group
+from .process.terminal import one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
+    from collections.abc import Callable, Iterable, Mapping
 
-__all__ = ["Output", "print_words", "wrapped"]
+__all__ = ["Output", "Printing", "can_be_folder", "print_words", "wrapped"]
+
+# Lines that a command prints at most without -v.
+MOST_LINES = 25
+# Endings by which --out is a file.
+ENDINGS = re.compile(
+    r"\.(csv|npz|mat|parquet|json|png|svg|pdf|html|xlsx?|txt|docx?|h5|tdms|jpe?g|tiff?|eps|md|c|py)"
+)
 
 # Columns that lines have at most and at least where they are wrapped, and what is before a note.
 WIDEST, NARROWEST, NOTE = 100, 40, "note  "
@@ -25,34 +34,78 @@ WIDEST, NARROWEST, NOTE = 100, 40, "note  "
 KEPT = re.compile(r" *(?:piezotrack |.*\S {2,}\S)")
 
 
-class Output:
-    """The options ``--out``, ``--overwrite``, ``--json`` and ``--quiet`` of a command.
+@group
+class Printing:
+    """Output."""
 
-    Parameters
-    ----------
-    out : pathlib.Path
-        Folder for the results.
-    overwrite : bool
-        Whether results that exist are replaced.
-    json, quiet : bool
-        Whether one JSON document is printed, or nothing.
+    verbose: Annotated[bool, Option("Print all lines", names=("--verbose", "-v"))] = False
+    json: Annotated[bool, Option("Print one JSON document")] = False
+    quiet: Annotated[bool, Option("Print errors only")] = False
 
-    Raises
-    ------
-    ParameterError
-        Both `json` and `quiet` are given.
-    """
-
-    def __init__(self, out: Path, *, overwrite: bool, json: bool, quiet: bool) -> None:
-        if json and quiet:
+    def __post_init__(self) -> None:
+        if self.json and self.quiet:
             raise ParameterError("--json and --quiet: expected one of them at most, both are given")
-        self.out = out
-        self._overwrite, self._json, self._quiet = overwrite, json, quiet
 
     @property
     def progress(self) -> bool:
         """Whether a long search shows its progress, on stderr."""
-        return not self._quiet
+        return not self.quiet
+
+    def show(
+        self,
+        words: str,
+        document: Mapping[str, Any],
+        written: Iterable[Path] | None = None,
+        *,
+        brief: str | None = None,
+    ) -> None:
+        """Print the results.
+
+        Parameters
+        ----------
+        words : str
+            For a person.
+        document : mapping
+            The same for a program: numbers, texts, lists and dicts only.
+        written : iterable of pathlib.Path, optional
+            The files; default none can be written.
+        brief : str, optional
+            Part of `words` that is printed without ``-v``; default all, as far as it fits.
+        """
+        files = list(written or ())
+        if self.json:
+            from .._support.files.writing import json_ready
+
+            names = {} if written is None else {"written": [str(path) for path in files]}
+            print(json_text.dumps(json_ready({**document, **names}), indent=2, allow_nan=False))
+        elif not self.quiet:
+            text = words if self.verbose else _shortened(words, brief or words, MOST_LINES)
+            print_words("\n".join([text, *_listed(files)]))
+
+
+@group
+class Output(Printing):
+    """Output."""
+
+    out: Annotated[
+        Path,
+        Option(
+            "Folder for the results; with an ending, the file for the result of this kind alone",
+            metavar="PATH",
+            names=("--out", "-o"),
+        ),
+    ] = Path("results")
+    overwrite: Annotated[bool, Option("Replace results that exist")] = False
+
+    @property
+    def is_file(self) -> bool:
+        """Whether one file is to be written."""
+        return ENDINGS.fullmatch(self.out.suffix.lower()) is not None and not self.out.is_dir()
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the results."""
+        return self.out.parent if self.is_file else self.out
 
     def will_write(self, names: Iterable[str]) -> None:
         """Refuse a folder that cannot be written to, or results that exist.
@@ -65,31 +118,101 @@ class Output:
         Raises
         ------
         ParameterError
-            The folder cannot be made, or one of the files exists and is not to be replaced.
+            The folder cannot be made, one of the files exists and is not to be replaced, or there
+            is no result of the ending of the file to write.
         """
-        can_be_written(self.out, names, overwrite=self._overwrite)
+        names = list(names)
+        if self.is_file:
+            endings = list(dict.fromkeys(Path(name).suffix for name in names))
+            if self.out.suffix.lower() not in endings:
+                raise ParameterError(
+                    "--out", self.out, f"a folder, or a file ending in {', '.join(endings)}"
+                )
+            names = [self.out.name]
+        can_be_folder(self.folder)
+        for path in [] if self.overwrite else [self.folder / name for name in names]:
+            if path.exists():
+                raise ParameterError(f"{path} exists: expected --overwrite, or another --out")
 
-    def show(self, words: str, document: Mapping[str, Any], written: Iterable[Path]) -> None:
-        """Print the results.
+    def write(self, save: Callable[[Path], Iterable[Path]], main: str = "") -> list[Path]:
+        """Write the results, or the one that the ending of a file chooses.
 
         Parameters
         ----------
-        words : str
-            For a person.
-        document : mapping
-            The same for a program: numbers, texts, lists and dicts only.
-        written : iterable of pathlib.Path
+        save : callable
+            Writes all results in a folder, and returns their paths.
+        main : str, optional
+            Name of the result that comes first among those of its ending.
+
+        Returns
+        -------
+        list of pathlib.Path
             The files.
         """
-        files = list(written)
-        if self._json:
-            from .._support.files.writing import json_ready
+        from .._support.files.writing import make_folder
 
-            whole = json_ready({**document, "written": [str(path) for path in files]})
-            print(json_text.dumps(whole, indent=2, allow_nan=False))
-        elif not self._quiet:
-            print_words(words)
-            list_files(files)
+        folder = make_folder(self.folder)
+        if not self.is_file:
+            return list(save(folder))
+        with TemporaryDirectory(dir=folder, prefix=".piezotrack-") as place:
+            ending = self.out.suffix.lower()
+            found = sorted(save(Path(place)), key=lambda path: path.name != main)
+            one = next(path for path in found if path.suffix == ending)
+            one.replace(self.out)
+        return [self.out]
+
+
+def can_be_folder(out: Path) -> None:
+    """Refuse a folder that cannot be written to before the computation begins.
+
+    Parameters
+    ----------
+    out : pathlib.Path
+        The folder.
+
+    Raises
+    ------
+    ParameterError
+        It cannot be made or written to.
+    """
+    there = out
+    try:
+        while not there.exists() and there != there.parent:
+            there = there.parent
+        is_folder = there.is_dir()
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise ParameterError(f"--out: {out} cannot be made a folder: {reason}") from None
+    if not is_folder:
+        raise ParameterError(f"--out: {out} cannot be made a folder: {there} is a file")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise ParameterError(f"--out: {there} cannot be written to: permission denied")
+
+
+def _listed(files: list[Path]) -> list[str]:
+    """Say which files were written: a line for each folder, endings behind each name."""
+    lines = []
+    for folder in dict.fromkeys(path.parent for path in files):
+        endings: dict[str, list[str]] = {}
+        for path in files:
+            if path.parent == folder:
+                endings.setdefault(path.stem, []).append(path.suffix)
+        names = ", ".join(one_line(stem + " ".join(kinds)) for stem, kinds in endings.items())
+        place = "" if folder == Path() else f" to {one_line(str(folder))}/"
+        lines.append(f"written{place}: {names}")
+    return ["", *lines] if lines else []
+
+
+def _shortened(words: str, brief: str, most: int) -> str:
+    """Return the brief words; after a number of lines that are not empty rows are left out."""
+    lines, filled = [], 0
+    for line in brief.split("\n"):
+        # What is not a row of a table stays.
+        filled += bool(line)
+        if filled <= most or line[:1] not in ("", " "):
+            lines.append(line)
+    more = len(words.split("\n")) - len(lines)
+    return "\n".join([*lines, f"... {more} more lines with -v"] if more > 0 else lines)
 
 
 def print_words(words: str) -> None:

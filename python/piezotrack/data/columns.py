@@ -98,6 +98,8 @@ class Columns(list[Column]):
         names = titles if has_titles else [""] * len(titles)
         super().__init__(Column(k, title, *split_unit(title)) for k, title in enumerate(names))
         self.has_titles = has_titles
+        # Numbers of those without any reading, which are no candidates.
+        self.empty: set[int] = set()
         # What a person should know of the columns, as a unit that is not that of the file.
         self.notes: list[str] = []
 
@@ -232,7 +234,7 @@ class Columns(list[Column]):
         for column in self:
             name, unit = _plain(column.name), lookup(column.unit)
             fits = unit is not None and unit.quantity == QUANTITIES[role][0]
-            if column.index in taken:
+            if column.index in taken | self.empty:
                 continue
             if role == "drive" and name in POSITIONS and (not unit or unit.si == "m"):
                 positions.append(column)
@@ -242,6 +244,11 @@ class Columns(list[Column]):
                 if fits or unit is None:
                     fitting.append(column)
         return fitting or positions or candidates
+
+    @property
+    def _filled(self) -> list[Column]:
+        """Those with a reading."""
+        return [column for column in self if column.index not in self.empty]
 
     def _only(self, columns: Sequence[Column], role: str) -> Column:
         if len(columns) == 1:
@@ -253,7 +260,7 @@ class Columns(list[Column]):
             raise DataError(f"{several}; choose one with {role}=")
         instead = ", or give the sampling interval with dt=" if role == "time" else ""
         nothing = f"no column is known to be the {role}: name it with {role}={instead}"
-        raise DataError(f"{nothing}; the columns are {_titles(self)}")
+        raise DataError(f"{nothing}; the columns are {_titles(self._filled)}")
 
 
 def is_usual(name: str) -> bool:

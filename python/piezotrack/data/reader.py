@@ -14,7 +14,7 @@ import numpy as np
 
 from .._support.arrays import LARGEST, UNEVEN, backward, check_dt, time_fault
 from .._support.units import lookup, require
-from ..errors import ParameterError
+from ..errors import DataError, ParameterError
 from .dataset import Dataset
 from .dataset_arguments import MIN_SAMPLES
 from .formats import open_log
@@ -50,6 +50,7 @@ def read(
     resample: float | None = None,
     hold: Hold = "foh",
     missing: Missing = None,
+    skip: int = 0,
 ) -> Dataset:
     r"""Read the log of one axis from a file.
 
@@ -60,8 +61,9 @@ def read(
         semicolons, tabs or blanks; outside of comma files the decimal mark may be a comma. Lines
         before the header that begin with ``#`` or ``%`` are skipped, and so are blank lines. Up to
         ten thousand columns, and a million characters in a line. Or a file in MAT, HDF5, TDMS,
-        NPZ, NPY, Parquet, MDF, a GCS array, LabVIEW's .lvm, Digilent WaveForms' CSV or an AFM
-        curve, known by its first bytes or its ending.
+        NPZ, NPY, Parquet, MDF, XLSX, a GCS array, LabVIEW's .lvm, an AFM curve, or the CSV of
+        Digilent WaveForms, Keysight, Tektronix, Rigol, PicoScope and AFM Workshop, known by its
+        first bytes or its ending.
     time, drive, displacement : str or int, optional
         The columns to use: the title in the header, with or without its unit, or the number of
         the column counted from 0. In a file with groups a title is a path, as
@@ -86,6 +88,8 @@ def read(
         What becomes of readings of drive and displacement that are NaN, or empty in a text:
         ``"drop"`` leaves them out of what is fitted and judged, ``"fill"`` puts straight lines
         there; see `Dataset`. A log with missing readings is refused where it is not given.
+    skip : int, optional
+        Lines of a text, or rows of a spreadsheet, above the titles that are left out.
 
     Returns
     -------
@@ -114,7 +118,7 @@ def read(
     Dataset(3 samples, 0.015 s at 200 Hz, stroke 3.5 um)
     >>> folder.cleanup()
     """
-    log = Log(path)
+    log = Log(path, skip)
     roles = log.roles({"time": time, "drive": drive, "displacement": displacement}, units, dt)
     log.takes(checked_missing(missing), roles)
     if resample is not None:
@@ -148,12 +152,13 @@ def read_drive(
     drive: str | int | None = None,
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
+    skip: int = 0,
 ) -> DriveRecord:
     r"""Read a drive from a file that need not have a displacement.
 
     Parameters
     ----------
-    path, time, drive, units, dt
+    path, time, drive, units, dt, skip
         As in `read`.
 
     Returns
@@ -178,7 +183,7 @@ def read_drive(
     array([1.5, 2.5, 3.5])
     >>> folder.cleanup()
     """
-    record = drive_dataset(path, time=time, drive=drive, units=units, dt=dt)
+    record = drive_dataset(path, time=time, drive=drive, units=units, dt=dt, skip=skip)
     return DriveRecord(record.t, record.u)
 
 
@@ -189,9 +194,10 @@ def drive_dataset(
     drive: str | int | None = None,
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
+    skip: int = 0,
 ) -> Dataset:
     """Read a drive as `read_drive`, with its unit; the displacement of the record is 0."""
-    log = Log(path)
+    log = Log(path, skip)
     return log.dataset(log.roles({"time": time, "drive": drive}, units, dt), dt, "foh")
 
 
@@ -202,12 +208,13 @@ def read_displacement(
     displacement: str | int | None = None,
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
+    skip: int = 0,
 ) -> Dataset:
     r"""Read a displacement from a file that need not have a drive.
 
     Parameters
     ----------
-    path, time, units, dt
+    path, time, units, dt, skip
         As in `read`.
     displacement : str or int, optional
         As in `read`; a column called reference, desired, target or setpoint has priority.
@@ -232,7 +239,7 @@ def read_displacement(
     array([2.e-06, 3.e-06, 4.e-06])
     >>> folder.cleanup()
     """
-    log = Log(path)
+    log = Log(path, skip)
     column = log.columns.to_follow() if displacement is None else displacement
     return log.dataset(log.roles({"time": time, "displacement": column}, units, dt), dt, "foh")
 
@@ -240,8 +247,8 @@ def read_displacement(
 class Log:
     """A file of any format, and how its columns become a record."""
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.table = open_log(path)
+    def __init__(self, path: str | os.PathLike[str], skip: int = 0) -> None:
+        self.table = open_log(path, skip)
         self.source, self.columns = self.table.source, self.table.columns
 
     def roles(
@@ -253,8 +260,29 @@ class Log:
         """Find the column in each role; with an interval, the time may be missing.
 
         With `dt` a column of the time is not used, and need not have a unit. Where the file
-        states the interval it may be missing.
+        states the interval it may be missing. Columns without any reading have no role that is
+        not given.
         """
+        try:
+            return self._roles(wanted, units, dt)
+        except DataError as error:
+            if (above := self.table.above()) is not None:
+                hint = (
+                    f"; the titles seem to be in line {above + 1}: skip={above} leaves out the rest"
+                )
+                raise DataError(f"{error}{hint}") from None
+            empty = {column.index for column in self.columns if self.table.is_empty(column)}
+            if not empty or empty == self.columns.empty:
+                raise
+            self.columns.empty = empty
+        return self._roles(wanted, units, dt)
+
+    def _roles(
+        self,
+        wanted: Mapping[str, str | int | None],
+        units: Mapping[str | int, str] | None,
+        dt: float | None,
+    ) -> dict[str, Column]:
         with self.source.named(self.table.header):
             if dt is not None:
                 check_dt(dt)

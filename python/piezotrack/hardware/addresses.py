@@ -70,12 +70,19 @@ def connect(address: str) -> Device:
         raise ParameterError("device", quoted(address), f"an address ({error})") from None
     named = [entry for entry in _entries() if entry.name == parts.scheme]
     if not named:
-        raise ParameterError("device", quoted(address), f"an address, one of {known}")
+        # A controller at a serial port or USB has no scheme of its own.
+        port_of = "; serial ports and USB are not supported" if _is_port(address) else ""
+        raise ParameterError("device", quoted(address), f"an address, one of {known}{port_of}")
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     # No other package replaces a scheme of this one.
     entry = min(named, key=lambda entry: (entry.module.partition(".")[0] != OWN, entry.value))
     device: Device = entry.load()(host, port, parts.path, options)
     return device
+
+
+def _is_port(address: str) -> bool:
+    """Whether an address is the name of a serial port or of a USB device."""
+    return address.startswith("/dev/") or address.lower().startswith(("com", "usb", "asrl"))
 
 
 def _entries() -> EntryPoints:

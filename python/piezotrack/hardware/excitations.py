@@ -273,7 +273,7 @@ EXCITATIONS = {
 def parse_drive(text: str, *, duration: float | None = None) -> Drive:
     r"""Make a drive from a text, as the command line takes it.
 
-    =============================  =========================================================
+    ============================== =========================================================
     ``decaying:1Hz,0..75V``        triangles whose range shrinks; optional duration
     ``sine:0.5Hz,0..75V``          frequency, lowest and highest voltage; optional duration,
                                    ``phase=90deg``, ``ramp=1s``
@@ -282,7 +282,7 @@ def parse_drive(text: str, *, duration: float | None = None) -> Drive:
     ``staircase:5,0..75V``         number of steps up, range, and ``dwell=1s``
     ``multisine:1/3Hz,0..75V,9s``  frequencies, range, duration; optional ``seed=1``
     ``drive.csv``                  a file, as `piezotrack.data.read_drive` takes it
-    =============================  =========================================================
+    ============================== =========================================================
 
     Parameters
     ----------

@@ -118,7 +118,7 @@ MOST_LETTERS = 10_000
 def parse_reference(text: str, *, duration: float | None = None) -> Reference:
     r"""Make a reference from a text, as the command line takes it.
 
-    =============================  =========================================================
+    ============================== =========================================================
     ``sine:0.2Hz,0..110um``        frequency, lowest and highest displacement; optional
                                    duration, ``phase=90deg``, ``ramp=1s``
     ``triangle:1Hz,0..50um``       the same; optional duration, ``rounding=0.2``, ``ramp=1s``
@@ -129,7 +129,7 @@ def parse_reference(text: str, *, duration: float | None = None) -> Reference:
     ``multisine:0.5/1.3Hz,0..9um`` frequencies, range, duration; optional ``seed=1``,
                                    ``ramp=1s``
     ``target.csv``                 a file, as `read_reference` takes it
-    =============================  =========================================================
+    ============================== =========================================================
 
     Parameters
     ----------

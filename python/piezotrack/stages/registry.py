@@ -43,9 +43,10 @@ def model_named(name: object) -> ModelInfo:
     for model in MODELS:
         if isinstance(name, str) and model.name == name:
             return model
+    if (near := _meant(name)) is not None:
+        raise ParameterError("model", quoted(name), f"the name of one (did you mean {near!r}?)")
     expected = ", ".join(repr(model.name) for model in MODELS)
-    hint = "" if (near := _meant(name)) is None else f". Did you mean {near!r}?"
-    raise ParameterError("model", quoted(name), f"one of {expected}{hint}")
+    raise ParameterError("model", quoted(name), f"one of {expected}")
 
 
 def _meant(name: object) -> str | None:

@@ -135,7 +135,7 @@ class XYStage:
         hysteresis in place of 10 % and reaches 115 um in place of 117.8 um, as two stacks of one
         batch may differ, and noise of its own; the cross-talk is 1.5 % of y in x and 1 % of x in y;
         the lag is half of the control interval of 0.02 s, as when two axes are sampled in turn.
-        None of these was fitted to Table 2; docs/paper.md shows the effect of lag and
+        None of these was fitted to Table 2; docs/evidence.md shows the effect of lag and
         cross-talk.
 
         Parameters

@@ -33,8 +33,8 @@ SEEDS = 20
 # The calibration uses seeds below this, and no report does.
 FIRST_SEED = 1000
 FORMAT, SCHEMA_VERSION = "piezotrack-reproduction", 1
-# Files of the report.
-REPORT = ("report.html", "report.pdf", "report.json")
+# Files of the report, beside its pictures.
+REPORT = ("report.md", "report.json")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -60,7 +60,7 @@ class Reproduction(Result):
     views: ClassVar[Mapping[str, str]] = {
         "summary": "xu_li_2010.views.report_text:summary_text",
         "plot": "xu_li_2010.views.figures:plot_reproduction",
-        "report": "xu_li_2010.views.report_files:save_report",
+        "report": "xu_li_2010.views.report:save_report",
     }
 
     experiments: Experiments
@@ -142,7 +142,7 @@ class Reproduction(Result):
         }
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write the report as HTML and PDF, and the same as JSON.
+        """Write the report as Markdown with pictures, and its numbers as JSON.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class Reproduction(Result):
         Returns
         -------
         list of pathlib.Path
-            ``report.html``, ``report.pdf`` and ``report.json``.
+            ``report.md``, ``report.json`` and the pictures.
 
         Raises
         ------

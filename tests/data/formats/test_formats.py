@@ -32,6 +32,7 @@ NEEDED = {
     "parquet": (b"PAR1", "log.parquet", "pyarrow", "parquet"),
     "mdf": (b"MDF     4.10    ", "log.mf4", "asammdf", "mdf"),
     "afm": (b"PK\x03\x04", "log.jpk-force", "afmformats", "afm"),
+    "xlsx": (b"PK\x03\x04", "log.xlsx", "openpyxl", "xlsx"),
 }
 
 

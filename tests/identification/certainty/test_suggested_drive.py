@@ -220,12 +220,12 @@ def test_the_command_writes_drive_figures_and_picture(
     t = np.arange(1000) * DT
     log = pt.VirtualStage.of(PLAYS, noise=NOISE).record(37.5 - 37.5 * np.cos(6.0 * t), DT)
     pt.identify(log, "prandtl-ishlinskii", method=pt.LeastSquares(count=3)).save("model.json")
-    common = ("suggest", "model.json", "--slew", "2000", "--seconds", "1", "--dt", "0.002")
+    common = ("suggest", "model.json", "--slew", "2000", "--duration", "1", "--dt", "0.002")
     printed = ran(*common, "--limits", "0:75")
-    assert "piezotrack measure --device ADDRESS --drive results/suggested.csv --rate 500" in printed
+    assert "piezotrack measure results/suggested.csv --device ADDRESS --rate 500" in printed
     document = json.loads(Path("results/suggested.json").read_text(encoding="utf-8"))
     assert document["samples"] == 500
     assert document["parameters"]["linear"]["standard_deviation"] > 0.0
     assert pt.hardware.parse_drive("results/suggested.csv").duration == pytest.approx(0.998)
     assert "--limits" in refusal(*common, "--limits", "75:0", "--overwrite")
-    assert "--noise-nm" in refusal(*common, "--limits", "0:75", "--overwrite", "--noise-nm", "0")
+    assert "--noise" in refusal(*common, "--limits", "0:75", "--overwrite", "--noise", "0nm")

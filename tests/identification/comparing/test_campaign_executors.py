@@ -125,7 +125,7 @@ def test_the_command_takes_the_address_of_a_scheduler(
     kind = ("--model", "prandtl-ishlinskii")
     address = cluster.scheduler_address.removeprefix("tcp://")
     ran("campaign", *logs, *kind, "--dask", address, "--out", "there")
-    ran("campaign", *logs, *kind, "--workers", "1", "--out", "here")
+    ran("campaign", *logs, *kind, "--threads", "1", "--out", "here")
     assert len(results(tmp_path / "here")) == 2 + len(PICTURE)
     assert results(tmp_path / "there") == results(tmp_path / "here")
 

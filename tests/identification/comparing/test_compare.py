@@ -364,7 +364,7 @@ MODELS = ("--model", "dahl", "--model", "prandtl-ishlinskii", "--runs", "1", "--
 
 @pytest.mark.usefixtures("_logs")
 def test_the_command_writes_what_python_finds() -> None:
-    printed = ran("compare", "log.csv", *MODELS, "--train", "1:5", "--threads", "1")
+    printed = ran("compare", "log.csv", *MODELS, "--window", "1:5", "--threads", "1")
     comparison = pt.compare(pt.read("log.csv"), PAIR, train=(1.0, 5.0), seed=1, runs=1)
     assert printed.startswith(comparison.summary())
     for path in comparison.save("expected"):
@@ -374,9 +374,9 @@ def test_the_command_writes_what_python_finds() -> None:
 
 @pytest.mark.usefixtures("_logs", "_no_pictures")
 def test_the_command_judges_on_another_log_and_takes_files() -> None:
-    second = ("--test-log", "other.csv", "--test", "2:", "--out", "a/b")
+    second = ("--test", "other.csv", "--test", "2:", "--out", "a/b")
     plays = ("--model", "prandtl-ishlinskii", "--hold", "foh")
-    ran("compare", "log.csv", *plays, "--train", "1:5", *second)
+    ran("compare", "log.csv", *plays, "--window", "1:5", *second)
     document = json.loads(Path("a/b/comparison.json").read_text())
     assert document["test"]["source"] == "other.csv"
     assert document["test"]["window_s"][0] == pytest.approx(2.0)
@@ -390,14 +390,20 @@ REFUSED_COMMANDS: dict[str, tuple[str, ...]] = {
     "compare log.csv --model jiles-atherton": ("log.csv: models has 'jiles-atherton'", "'dahl'"),
     "compare log.csv --model gone.json": ("gone.json: no such file",),
     "compare log.csv --model log.json": ("log.json",),
-    "compare log.csv --train 5": ("--train is '5'", "expected A:B"),
-    "compare log.csv --train a:b": ("--train has 'a'", "number"),
-    "compare log.csv --train 1:": ("nothing to validate on", "or --test"),
-    "compare log.csv --test :4": ("nothing to fit", "or --train"),
-    "compare log.csv --train 1:30": ("log.csv: train: the window from 1 s to 30 s",),
-    "compare log.csv --train 1:5 --test 4:6": ("log.csv: --test goes from 4", "do not overlap"),
-    "compare log.csv --test-log gone.csv": ("gone.csv: there is no such file",),
-    "compare log.csv --test-log other.csv --test 50:": ("other.csv: --test 50:", "start < stop"),
+    "compare log.csv --window 5": ("--window is '5'", "expected A:B"),
+    "compare log.csv --window a:b": ("--window has 'a'", "number"),
+    "compare log.csv --window 1:": ("nothing to validate on", "or --test"),
+    "compare log.csv --test-window :4": ("nothing to fit", "or --window"),
+    "compare log.csv --window 1:30": ("log.csv: train: the window from 1 s to 30 s",),
+    "compare log.csv --window 1:5 --test-window 4:6": (
+        "log.csv: --test goes from 4",
+        "do not overlap",
+    ),
+    "compare log.csv --test gone.csv": ("gone.csv: there is no such file",),
+    "compare log.csv --test other.csv --test-window 50:": (
+        "other.csv: --test-window 50:",
+        "start < stop",
+    ),
     "compare log.csv --out file": ("file cannot be made a folder",),
     "compare log.csv --model dahl --seed -1": ("seed is -1", "0 or above"),
     "compare log.csv --model dahl --runs 0": ("runs is 0", "1 or more"),

@@ -39,7 +39,7 @@ def test_noise_is_found_again_and_given_to_a_stage() -> None:
         assert ratio == pytest.approx(1.0, abs=0.15)
     figure = noise.plot()
     figure.canvas.draw()
-    assert [ax.get_xlabel() for ax in figure.axes] == ["time [ms]", "frequency [Hz]"]
+    assert [ax.get_xlabel() for ax in figure.axes] == ["time [ms], of 10 s", "frequency [Hz]"]
     plt.close(figure)
 
 

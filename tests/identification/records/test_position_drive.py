@@ -130,9 +130,7 @@ def test_a_model_file_keeps_the_unit() -> None:
 @pytest.mark.usefixtures("_no_pictures")
 def test_the_commands_take_it() -> None:
     write_log()
-    printed = ran(
-        "identify", "curve.csv", "--model", "prandtl-ishlinskii", "--validate", "curve.csv"
-    )
+    printed = ran("identify", "curve.csv", "--model", "prandtl-ishlinskii", "--test", "curve.csv")
     assert "V" not in printed
     assert names("results") == ["prandtl-ishlinskii.json"]
     table = np.column_stack([height().t, 1e9 * height().u])
@@ -150,7 +148,7 @@ def test_the_commands_take_it() -> None:
     # What the piezo is asked for brings about what was wanted.
     assert np.ptp(pt.load(model).simulate(drive).x[500:]) == pytest.approx(35e-6, rel=0.01)
     paper = ("--stage", "xu-li-2010")
-    message = refusal("track", model, "--reference", "sine:1Hz,5..40um", *paper)
+    message = refusal("track", model, "sine:1Hz,5..40um", *paper)
     assert message.startswith("prandtl-ishlinskii.json: the drive of this model is a position")
     Path("volts.csv").write_text("time_s,voltage_V\n0,0\n1,1\n2,0\n3,1\n", encoding="utf-8")
     message = refusal("simulate", "results/prandtl-ishlinskii.json", "volts.csv")
@@ -171,7 +169,7 @@ def test_closed_loops_take_it() -> None:
     """Limits in um, gains in um/um: the same loop as with the same numbers in volts."""
     write_log()
     ran("identify", "curve.csv", "--model", "prandtl-ishlinskii")
-    course = ("--reference", "sine:1Hz,5..40um,4s", "--dt", "0.002", "--kp", "0.1", "--ti", "0.02")
+    course = ("sine:1Hz,5..40um,4s", "--dt", "0.002", "--kp", "0.1", "--ti", "0.02")
     model = "results/prandtl-ishlinskii.json"
     printed = ran("track", model, *course, "--limits", "0:45", "--repetitive")
     assert not re.search(r"\bV\b", printed)
@@ -183,9 +181,9 @@ def test_closed_loops_take_it() -> None:
     assert np.abs(rows["desired_um"] - rows["measured_um"])[late].max() < 0.5
     match = refusal("track", model, *course[:2], "--kp", "900", "--ti", "0.02", "--overwrite")
     assert re.search(r"on this stage, [\d.]+ um/um; at the limit kp would be [\d.]+ um/um", match)
-    match = refusal("track", model, "--reference", "sine:1Hz,5..400um", "--overwrite")
+    match = refusal("track", model, "sine:1Hz,5..400um", "--overwrite")
     assert re.search(r"which this stage reaches from [\d.]+ to [\d.]+ um", match)
-    two = ("contour", model, "--path", "circle:1Hz,5um", "--kp", "0.1", "--ti", "0.02")
+    two = ("contour", model, "circle:1Hz,5um", "--kp", "0.1", "--ti", "0.02")
     assert not re.search(r"\bV\b", ran(*two, "--dt", "0.002"))
 
 

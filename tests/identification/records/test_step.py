@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import piezotrack as pt
 from folders import SHARED
@@ -456,9 +456,9 @@ def test_the_picture_has_peaks_and_units() -> None:
     figure = step.plot()
     left, right = figure.axes
     assert left.get_xlabel() == "time after the step [ms]"
-    assert left.get_ylabel() == "displacement [um]"
+    assert left.get_ylabel() == "displacement [\N{MICRO SIGN}m]"
     assert right.get_xlabel() == "frequency [Hz]"
-    assert right.get_ylabel() == "gain [um/V]"
+    assert right.get_ylabel() == "gain [\N{MICRO SIGN}m/V]"
     marks = next(line for line in left.lines if line.get_label() == "overshoot peaks")
     assert list(np.asarray(marks.get_ydata())) == [1e6 * peak for peak in step.readings.peaks]
     plt.close(figure)
@@ -488,7 +488,7 @@ def test_the_command(tmp_path: Path) -> None:
     write_columns(file, {"time_s": log.t, "voltage_V": log.u, "displacement_um": 1e6 * log.y})
     runner = CliRunner()
     out = str(tmp_path / "results")
-    done = runner.invoke(app, ["step", str(file), "--out", out, "--stiffness", "26065"])
+    done = runner.invoke(app, ["step", str(file), "--out", out, "--fix", "stiffness=26065"])
     assert (done.exit_code, done.stderr) == (0, "")
     step = pt.identify_step(pt.read(file, hold="zoh"), stiffness=26065.0)
     assert done.stdout.startswith(step.summary())
@@ -498,7 +498,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert document["hysteresis"] == step.hysteresis
     assert document["damping_ratio"] == step.damping_ratio
     level = runner.invoke(
-        app, ["step", str(file), "--out", out, "--overwrite", "--second-level", "37.5:61"]
+        app, ["step", str(file), "--out", out, "--overwrite", "--second-level", "37.5V:61um"]
     )
     assert level.exit_code == 0
     assert "with a second static level" in level.stdout

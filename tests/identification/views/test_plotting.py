@@ -82,10 +82,10 @@ def test_without_axes_a_figure_is_made() -> None:
 
 def test_the_sheet_has_four_labelled_panels() -> None:
     figure = fitted().plot()
-    loop, convergence, above, below = figure.axes
-    assert labels(loop) == ("drive [V]", "displacement [um]")
-    assert labels(convergence) == ("iteration", "best cost, rms [um]")
-    assert above.get_ylabel() == "displacement [um]"
+    loop, above, convergence, below = figure.axes
+    assert labels(loop) == ("drive [V]", "displacement [\N{MICRO SIGN}m]")
+    assert labels(convergence) == ("iteration", "best cost, rms [\N{MICRO SIGN}m]")
+    assert above.get_ylabel() == "displacement [\N{MICRO SIGN}m]"
     # One time axis for both.
     assert labels(below) == ("time [s]", "error [nm]")
     assert above.get_shared_x_axes().joined(above, below)
@@ -98,7 +98,7 @@ def test_the_sheet_has_four_labelled_panels() -> None:
 def test_what_is_drawn_is_what_was_measured_and_simulated() -> None:
     log = quick()
     run = fitted().simulate(log, offset=fitted().offset)
-    loop, convergence, above, below = fitted().plot().axes
+    loop, above, convergence, below = fitted().plot().axes
     for ax, x in ((loop, log.u), (above, log.t)):
         for line, y in ((0, log.y), (1, run.x)):
             drawn_x, drawn_y = points(ax, line)
@@ -118,7 +118,7 @@ def test_what_is_drawn_is_what_was_measured_and_simulated() -> None:
 def test_another_record_can_be_shown() -> None:
     other = quick(5)[1.0:3.0]
     figure = fitted().plot(other)
-    t, y = points(figure.axes[2], 0)
+    t, y = points(figure.axes[1], 0)
     assert np.allclose(t, other.t)
     assert np.allclose(y, 1e6 * other.y)
     score = fitted().score(other)
@@ -138,7 +138,10 @@ def test_a_model_from_a_file_is_drawn_on_a_record(tmp_path: Path) -> None:
     assert len(figure.axes) == 3
     assert "not fitted" not in figure.get_suptitle()
     assert "not fitted" in model.plot(quick(5)[1.0:3.0]).get_suptitle()
-    for draw in (model.plot, model.plot_loop, model.plot_time):
+    # Without one the loops in the range of the drive that was fitted.
+    drawn = points(model.plot().axes[1], 0)[0]
+    assert (drawn.min(), drawn.max()) == pytest.approx((log.u.min(), log.u.max()), abs=1e-3)
+    for draw in (model.plot_loop, model.plot_time):
         with pytest.raises(pt.ParameterError, match="a model from a file has none"):
             draw()
     assert f"{model.model.mass:.6g}" in model.summary()
@@ -159,7 +162,8 @@ def test_a_fit_by_least_squares_has_no_convergence() -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "unit", "scale"), [(1.0, "um", 1e6), (1e-3, "nm", 1e9), (100.0, "mm", 1e3)]
+    ("factor", "unit", "scale"),
+    [(1.0, "\N{MICRO SIGN}m", 1e6), (1e-3, "nm", 1e9), (100.0, "mm", 1e3)],
 )
 def test_the_unit_follows_the_stroke(factor: float, unit: str, scale: float) -> None:
     log, run = scaled(factor)
@@ -179,8 +183,8 @@ def test_the_unit_of_the_drive_is_the_records() -> None:
 def test_a_response_is_drawn_over_time_and_over_the_drive() -> None:
     log, run = quick(), response()
     left, right = plot_response(log.t, log.u, run.x).axes
-    assert labels(left) == ("time [s]", "displacement [um]")
-    assert labels(right) == ("drive [V]", "displacement [um]")
+    assert labels(left) == ("time [s]", "displacement [\N{MICRO SIGN}m]")
+    assert labels(right) == ("drive [V]", "displacement [\N{MICRO SIGN}m]")
     assert np.allclose(points(left, 0)[1], 1e6 * run.x)
     assert np.allclose(points(right, 0)[0], log.u)
 

@@ -67,6 +67,6 @@ def test_validation_says_which_share_was_fitted(
     monkeypatch.chdir(tmp_path)
     write_log(log(), Path("log.csv"))
     arguments = ("identify", "log.csv", "--window", ":1.5", "--model", "prandtl-ishlinskii")
-    done = run(*arguments, "--validate", "log.csv", "--validate-window", window)
+    done = run(*arguments, "--test", "log.csv", "--test-window", window)
     line = next(one for one in done.output.splitlines() if one.startswith("on log.csv"))
     assert message in line, done.output

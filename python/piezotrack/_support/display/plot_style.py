@@ -6,9 +6,6 @@ its width or its line style.
 
 from __future__ import annotations
 
-import warnings
-from contextlib import contextmanager
-from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,9 +13,12 @@ import numpy as np
 from ...errors import ParameterError
 from ..arguments import expect, has_entries
 from ..messages import quoted
+from .fitting import ROOMS, place_legend, whole
+from .look import drawing, look
+from .wrapping import folded
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, FigureBase, SubFigure
@@ -46,16 +46,20 @@ __all__ = [
     "REPETITIVE",
     "SIMULATED",
     "axes_or_new",
-    "few_ticks",
+    "caption",
+    "drawing",
     "folded",
     "heading",
+    "is_narrow",
     "legend_inside",
     "literal",
+    "names_beside",
     "panels",
     "plain_log_ticks",
+    "sheet",
     "thinned",
+    "trace",
     "whole",
-    "without_glyph_warnings",
 ]
 
 GREY, BLUE, RED, ORANGE, GREEN, PURPLE = (
@@ -124,6 +128,12 @@ MODELS: tuple[dict[str, Any], ...] = tuple(
 MOST_POINTS = 6000
 # Height of a row of a legend, as a part of the axes.
 ROW = 0.085
+# Width [inch] below which panels are not beside each other.
+NARROW = 4.9
+# Height of a panel at least [inch].
+LEAST = 1.3
+# Letters of a name in a line, where it is narrow and where it is wide.
+LETTERS = (15, 30)
 
 
 def _new_figure(size: tuple[float, float]) -> Figure:
@@ -132,7 +142,8 @@ def _new_figure(size: tuple[float, float]) -> Figure:
 
     from .notebook import Picture
 
-    return plt.figure(FigureClass=Picture, figsize=size, layout="constrained")
+    figsize = look().size(*size)
+    return plt.figure(FigureClass=Picture, figsize=figsize, layout="constrained")
 
 
 def panels(given: Figure | SubFigure | None, size: tuple[float, float]) -> FigureBase:
@@ -142,15 +153,85 @@ def panels(given: Figure | SubFigure | None, size: tuple[float, float]) -> Figur
     if given is None:
         return _new_figure(size)
     expect("fig", given, FigureBase, "a figure of Matplotlib, or a part of one")
+    figure = whole(given)
+    if not figure.axes and figure.get_layout_engine() is None:
+        figure.set_layout_engine("constrained")
     return given
 
 
-def whole(drawn: FigureBase) -> Figure:
-    """Return the figure that a panel of figures belongs to."""
-    # A figure is its own parent.
-    while (parent := drawn.figure) is not drawn:
-        drawn = parent
-    return drawn  # type: ignore[return-value]
+def is_narrow(given: Figure | SubFigure | None, size: tuple[float, float]) -> bool:
+    """Whether a figure, a new one of a size where None, has no room for panels side by side."""
+    width = look().size(*size)[0] if given is None else given.bbox.width / whole(given).dpi
+    return width < NARROW
+
+
+def sheet(
+    given: Figure | SubFigure | None,
+    size: tuple[float, float],
+    rows: Sequence[Sequence[str]],
+    *,
+    heights: Sequence[float] | None = None,
+    widths: Sequence[float] | None = None,
+    least: float = LEAST,
+    down: bool = False,
+) -> tuple[FigureBase, dict[str, Axes]]:
+    """Make the panels of a picture: beside each other, or below each other where it is narrow.
+
+    Parameters
+    ----------
+    given : Figure or SubFigure or None
+        The figure to draw in; a new one where None.
+    size : tuple of float
+        Width and height of a new figure as wide as a screen [inch].
+    rows : sequence of sequences of str
+        Names of the panels, as of ``Figure.subplot_mosaic``; "." is none.
+    heights, widths : sequence of float, optional
+        Parts of rows and columns; the same for all where not given.
+    least : float, optional
+        Height of the lowest panel of a new figure at least [inch].
+    down : bool, optional
+        Whether panels of a narrow picture are in the order of the columns, not of the rows.
+
+    Returns
+    -------
+    figure, axes
+        The figure, and the axes by their names.
+    """
+    parts, across = heights or [1.0] * len(rows), widths or [1.0] * len(rows[0])
+    if len(across) > 1 and is_narrow(given, size):
+        cell = size[1] / sum(parts), size[0] / sum(across)
+        read = zip(*rows, strict=True) if down else rows
+        names = dict.fromkeys(name for row in read for name in row if name != ".")
+        parts = [_proportion(name, rows, parts, across, cell) for name in names]
+        rows, across = [[name] for name in names], [1.0]
+        size = size[0], size[0] * sum(parts)
+    width, height = look().size(*size)
+    height = max(height, least * sum(parts) / min(parts))
+    figure = panels(given, (size[0], size[0] * height / width))
+    axes = figure.subplot_mosaic(
+        [list(row) for row in rows], height_ratios=parts, width_ratios=across
+    )
+    return figure, axes
+
+
+def _proportion(
+    name: str,
+    rows: Sequence[Sequence[str]],
+    heights: Sequence[float],
+    widths: Sequence[float],
+    cell: tuple[float, float],
+) -> float:
+    """Return height over width of a panel, within what is seen well."""
+    high = sum(part for part, row in zip(heights, rows, strict=True) if name in row)
+    columns = zip(*rows, strict=True)
+    wide = sum(part for part, column in zip(widths, columns, strict=True) if name in column)
+    return min(0.75, max(0.5, high * cell[0] / (wide * cell[1])))
+
+
+def names_beside(ax: Axes, places: Sequence[float] | Array, names: Sequence[str]) -> None:
+    """Write names beside rows, in lines that leave room for what is drawn."""
+    wide = int(whole(ax.figure).get_figwidth() > NARROW)
+    ax.set_yticks(list(places), [folded(literal(name), LETTERS[wide]) for name in names])
 
 
 def axes_or_new(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
@@ -186,43 +267,68 @@ def thinned(values: Array) -> NDArray[np.intp]:
     return np.unique(np.concatenate([extremes.ravel(), tail, ends]))
 
 
-def plain_log_ticks(ax: Axes) -> None:
+def trace(
+    ax: Axes,
+    t: Array,
+    values: Array,
+    style: Mapping[str, Any],
+    *,
+    steps: bool = False,
+    zero: bool = False,
+    xlabel: str = "",
+    ylabel: str = "",
+) -> None:
+    """Draw a signal over time, thinned, from the first to the last instant.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+        Where to draw.
+    t, values : ndarray, shape (n,)
+        Times, and the signal.
+    style : mapping
+        Of the line.
+    steps : bool, optional
+        Whether each value holds until the next.
+    zero : bool, optional
+        Whether a line is drawn through 0.
+    xlabel, ylabel : str, optional
+        Labels of the axes.
+    """
+    kept = thinned(values)
+    ax.plot(t[kept], values[kept], drawstyle="steps-post" if steps else "default", **style)
+    if zero:
+        ax.axhline(0.0, **GUIDE)
+    ax.set(xlabel=xlabel or ax.get_xlabel(), ylabel=ylabel or ax.get_ylabel())
+    ax.margins(x=0.0)
+
+
+def plain_log_ticks(ax: Axes, axis: str = "y") -> None:
     """Label a short logarithmic axis with plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-    low, high = ax.get_ylim()
+    low, high = ax.get_ylim() if axis == "y" else ax.get_xlim()
     decades = np.log10(high / low)
     plain = FuncFormatter(lambda value, _: f"{value:.12g}")
     # So many labels that there are two at least, and few that they do not touch.
     subs = (1.0, 2.0, 5.0) if decades < 2.5 else (1.0,)
     several = MaxNLocator(5) if decades < 0.7 else LogLocator(subs=subs, numticks=12)
-    ax.yaxis.set_major_locator(several)
-    ax.yaxis.set_major_formatter(plain)
-    ax.yaxis.set_minor_formatter(NullFormatter())
+    which = ax.yaxis if axis == "y" else ax.xaxis
+    which.set_major_locator(several)
+    which.set_major_formatter(plain)
+    which.set_minor_formatter(NullFormatter())
 
 
-def few_ticks(ax: Axes, axis: str = "x") -> None:
-    """Set so few numbers that long ones, as -107.5, do not touch."""
-    ax.locator_params(axis=axis, nbins=5)  # type: ignore[arg-type]
+def heading(ax: Axes, words: str) -> None:
+    """Write a title above axes, which a paper leaves to the caption."""
+    if not look().paper:
+        ax.set_title(words, fontsize="medium")
 
 
-def heading(ax: Axes, words: str, width: int = 68) -> None:
-    """Write a title in lines that fit the axes; `words` may hold line breaks."""
-    ax.set_title(folded(words, width), fontsize="medium")
-
-
-def folded(words: str, width: int) -> str:
-    """Break lines that are too long, into parts of about one length."""
-    return "\n".join(part for line in words.splitlines() for part in _evenly(line, width))
-
-
-def _evenly(line: str, width: int) -> list[str]:
-    def parts(most: int) -> list[str]:
-        return wrap(line, most, break_long_words=False, break_on_hyphens=False)
-
-    # The shortest lines of which there are as few; no single word on the last one.
-    needed = len(parts(width))
-    return next((parts(most) for most in range(20, width) if len(parts(most)) == needed), [line])
+def caption(figure: FigureBase, words: str, size: str = "large") -> None:
+    """Write a title above all panels, which a paper leaves to the caption."""
+    if not look().paper:
+        figure.suptitle(words, fontsize=size)
 
 
 def literal(words: str) -> str:
@@ -235,34 +341,14 @@ def literal(words: str) -> str:
     return shown.replace("$", r"\$")
 
 
-@contextmanager
-def without_glyph_warnings() -> Iterator[None]:
-    """Draw a box for a letter that the font does not have, without a warning for each."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", r"Glyph \d+ .*missing from", UserWarning)
-        yield
-
-
 def legend_inside(ax: Axes, ncols: int = 4) -> None:
     """Put the legend at the top of the axes, in room that is made for it above the data."""
     count = len(ax.get_legend_handles_labels()[1])
     if not count:
         return
     low, high = ax.get_ylim()
-    part = ROW * -(-count // ncols) + 0.02
-    if ax.get_yscale() == "log":
-        top = high * (high / low) ** (part / (1.0 - part))
-    else:
-        top = high + (high - low) * part / (1.0 - part)
-    ax.set_ylim(low, top)
-    ax.legend(
-        loc="upper left",
-        ncols=ncols,
-        fontsize="small",
-        framealpha=0.8,
-        edgecolor="none",
-        borderaxespad=0.25,
-        borderpad=0.1,
-        columnspacing=1.2,
-        handlelength=2.2,
-    )
+    if ax in ROOMS and ROOMS[ax][0] == low:
+        # It has room already.
+        high = ROOMS[ax][1]
+    ROOMS[ax] = (low, high, ncols)
+    place_legend(ax, min(ncols, count), ROW * -(-count // ncols) + 0.02)

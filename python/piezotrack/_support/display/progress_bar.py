@@ -6,8 +6,9 @@ import sys
 import time
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from importlib import import_module
 from threading import Event, Thread
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .progress_parts import part_at_work
 
@@ -24,6 +25,9 @@ __all__ = ["ProgressBar", "console", "one_clock"]
 
 # Seconds before the first line of words, and between two.
 FIRST, EVERY = 3.0, 5.0
+# Seconds before the first line in a notebook, and between two; and its bar.
+SOON, OFTEN = 0.5, 0.2
+WIDE, BLOCK, SHADE = 16, "\N{FULL BLOCK}", "\N{LIGHT SHADE}"
 
 
 def console() -> Console:
@@ -85,12 +89,14 @@ class ProgressBar:
     """
 
     def __init__(self, show: bool | None, task: str) -> None:
-        self._view: _Bar | _Words | None = None
+        self._view: _Bar | _Cell | _Words | None = None
         self._part = part_at_work()
         if show is not None and not show:
             return
         place = console()
-        if place.is_terminal or place.is_jupyter:
+        if place.is_jupyter:
+            self._view = _Cell(task)
+        elif place.is_terminal:
             self._view = _Bar(place, task)
         elif show:
             self._view = _Words(sys.stderr, task)
@@ -153,11 +159,10 @@ class _Bar:
             transient=True,
         )
         self._task = self._bar.add_task(task, total=None, words="")
-        self._leaves_nothing = place.is_terminal and not place.is_jupyter
 
     def start(self, share: float, words: str) -> None:
-        """Draw a later part; in a notebook, what takes no time would leave an empty place."""
-        if share and self._leaves_nothing:
+        """Draw a later part."""
+        if share:
             self.step(share, words)
 
     def stop(self) -> None:
@@ -166,6 +171,39 @@ class _Bar:
     def step(self, share: float, words: str) -> None:
         self._bar.start()
         self._bar.update(self._task, completed=share, total=1.0 if share else None, words=words)
+
+
+class _Cell:
+    """A line below the cell of a notebook, which is empty at the end.
+
+    The widgets of rich stay in the notebook, empty.
+    """
+
+    def __init__(self, task: str) -> None:
+        self._task = task
+        self._handle: Any = None
+        self._due = time.monotonic() + SOON
+
+    def start(self, share: float, words: str) -> None:
+        self.step(share, words)
+
+    def stop(self) -> None:
+        if self._handle is not None:
+            self._handle.update({"text/html": ""}, raw=True)
+
+    def step(self, share: float, words: str) -> None:
+        if time.monotonic() < self._due:
+            return
+        # IPython is there in a notebook, and is not needed for anything else.
+        display: Any = import_module("IPython.display").display
+        self._due = time.monotonic() + OFTEN
+        filled = round(WIDE * share)
+        bar = f"{filled * BLOCK}{(WIDE - filled) * SHADE}"
+        line = {"text/plain": "  ".join(filter(None, (self._task, bar, words)))}
+        if self._handle is None:
+            self._handle = display(line, raw=True, display_id=True)
+        else:
+            self._handle.update(line, raw=True)
 
 
 class _Words:

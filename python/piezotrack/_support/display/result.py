@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["Result", "Viewed"]
+    from .look import Style, Width
+
+__all__ = ["Panel", "Result", "Viewed"]
 
 
 class Viewed:
@@ -49,30 +51,94 @@ class Viewed:
         view: Callable[..., Any] = getattr(imported, function)
         return view
 
-    def plot(self, *, fig: Figure | SubFigure | None = None) -> Figure:
+    def plot(
+        self,
+        *,
+        fig: Figure | SubFigure | None = None,
+        style: Style | None = None,
+        width: Width | None = None,
+    ) -> Figure:
         """Draw it.
 
         Parameters
         ----------
         fig : matplotlib.figure.Figure or SubFigure, optional
             Where to draw; a new figure of pyplot where not given.
+        style : {"screen", "paper"}, optional
+            As in `piezotrack.figure_style`.
+        width : str or float, optional
+            Width of a new figure, as ``"85mm"``; a number is in metres.
 
         Returns
         -------
         matplotlib.figure.Figure
             The figure drawn in; ``plt.show()`` shows it, a notebook shows it by itself.
         """
-        figure: Figure = self.view("plot")(self, fig)
+        figure: Figure = self.view("plot")(self, fig, style=style, width=width)
         return figure
-
-    def _panel(self, name: str, ax: Axes | None, **options: Any) -> Axes:
-        """Draw one panel of the picture in axes, new ones where not given."""
-        axes: Axes = self.view(name)(self, ax, **options)
-        return axes
 
     def _repr_html_(self) -> str:
         table: str = self.view("html")(self)
         return table
+
+
+PANEL = """{}
+
+Parameters
+----------
+ax : matplotlib.axes.Axes, optional
+    Where to draw; a new figure of pyplot where not given.
+style : {{"screen", "paper"}}, optional
+    As in `piezotrack.figure_style`.
+width : str or float, optional
+    Width of a new figure, as ``"85mm"``; a number is in metres.
+
+Returns
+-------
+matplotlib.axes.Axes
+    The axes drawn on.
+"""
+
+
+class Panel:
+    """A panel of a picture, which becomes a method of the class that it is in.
+
+    The function that draws it is in `Viewed.views` under the name of the method.
+
+    Parameters
+    ----------
+    words : str
+        First sentence of the docstring.
+    """
+
+    def __init__(self, words: str) -> None:
+        self.words = words
+
+    def __set_name__(self, owner: type[Viewed], name: str) -> None:
+        def draw(
+            self: Viewed,
+            *,
+            ax: Axes | None = None,
+            style: Style | None = None,
+            width: Width | None = None,
+        ) -> Axes:
+            axes: Axes = self.view(name)(self, ax, style=style, width=width)
+            return axes
+
+        draw.__doc__ = PANEL.format(self.words)
+        draw.__name__, draw.__module__ = name, owner.__module__
+        draw.__qualname__ = f"{owner.__qualname__}.{name}"
+        setattr(owner, name, draw)
+
+    if TYPE_CHECKING:
+
+        def __call__(
+            self,
+            *,
+            ax: Axes | None = None,
+            style: Style | None = None,
+            width: Width | None = None,
+        ) -> Axes: ...
 
 
 class Result(Viewed):

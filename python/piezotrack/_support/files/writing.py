@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import DataError
 from ..arguments import expect
-from ..display.plot_style import without_glyph_warnings
+from ..display.look import look, without_glyph_warnings
 from .sets import MARKER, current_set, finish_others, result_set
 from .temporary import create, forget
 
@@ -34,10 +34,6 @@ __all__ = [
     "write_document",
     "write_result",
 ]
-
-
-# Formats of a picture.
-ENDINGS = ("png", "svg")
 
 
 @contextmanager
@@ -180,11 +176,11 @@ def picture_files(*names: str) -> list[str]:
     list of str
         With their endings.
     """
-    return [f"{name}.{ending}" for name in names for ending in ENDINGS]
+    return [f"{name}.{ending}" for name in names for ending in look().formats]
 
 
 def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
-    """Save figures as PNG and SVG, and close them.
+    """Save figures in the formats of `figure_style`, and close them.
 
     Parameters
     ----------
@@ -208,9 +204,14 @@ def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
                 for file in picture_files(name):
                     path = folder / file
                     # Without a date and with fixed ids, the same result gives the same file.
-                    stamp = {"Date": None} if path.suffix == ".svg" else {}
-                    with replacing(path) as temporary, mpl.rc_context({"svg.hashsalt": name}):
-                        figure.savefig(temporary, dpi=150, metadata=stamp)
+                    dates: dict[str, dict[str, Any]] = {
+                        ".svg": {"Date": None},
+                        ".pdf": {"CreationDate": None},
+                    }
+                    settings: Any = {"svg.hashsalt": name, "pdf.fonttype": 42}
+                    with replacing(path) as temporary, mpl.rc_context(settings):
+                        stamp = dates.get(path.suffix, {})
+                        figure.savefig(temporary, dpi=look().dots, metadata=stamp)
                     written.append(path)
     finally:
         for figure in figures.values():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import ParameterError
 from ..arguments import expect
-from ..display.plot_style import without_glyph_warnings
+from ..display.look import without_glyph_warnings
 from ..files.writing import replacing
 from .html import html_text
 from .pdf import write_pdf

@@ -6,7 +6,18 @@ import math
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
-from ..._support.display.plot_style import LEVEL, folded, literal, panels, whole
+from ..._support.display.look import look
+from ..._support.display.plot_style import (
+    LEVEL,
+    drawing,
+    is_narrow,
+    legend_inside,
+    literal,
+    names_beside,
+    panels,
+    plain_log_ticks,
+    whole,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,8 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_board"]
 
-# Records side by side, and letters of a name in a line.
-COLUMNS, LABEL = 2, 34
+# Records side by side.
+COLUMNS = 2
 FITTED: dict[str, Any] = {"marker": "|", "color": "0.35", "markersize": 11, "markeredgewidth": 1.6}
 CARRIED: dict[str, Any] = {"marker": "o", "color": "#d98200", "markersize": 6}
 # Other records, in their order; from the fifth on again.
@@ -29,6 +40,7 @@ OTHERS: tuple[dict[str, Any], ...] = (
 )
 
 
+@drawing
 def plot_board(board: Benchmark, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw the rms of each model on each part of each record.
 
@@ -47,9 +59,14 @@ def plot_board(board: Benchmark, fig: Figure | SubFigure | None = None) -> Figur
     tables = [[row for row in board.of(name) if row.parts] for name in board.records]
     tables = [rows for rows in tables if rows]
     columns = min(COLUMNS, max(1, len(tables)))
+    if is_narrow(fig, (7.2 * columns, 3.4)):
+        columns = 1
     lines = [tables[i : i + columns] for i in range(0, len(tables), columns)]
     heights = [max(len(rows) for rows in line) + 3.2 for line in lines] or [4.0]
-    figure = panels(fig, (7.2 * columns, max(3.4, 0.27 * sum(heights))))
+    size = (7.2 * columns, max(3.4, 0.27 * sum(heights)))
+    # Letters do not shrink with the width: there is more height in its place.
+    scale = size[0] / look().size(*size)[0]
+    figure = panels(fig, (size[0], size[1] * max(1.0, 0.75 * scale)))
     grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
     for i, line in enumerate(lines):
         for k, rows in enumerate(line):
@@ -71,38 +88,15 @@ def _record(ax: Axes, rows: list[BenchmarkResult]) -> None:
     if math.isfinite(noise):
         ax.axvline(noise, **LEVEL, label="noise")
     ax.set_xscale("log")
-    _plain_ticks(ax)
-    ax.set_yticks(list(places), [folded(literal(_name(row)), LABEL) for row in rows])
+    plain_log_ticks(ax, "x")
+    names_beside(ax, places, [_name(row) for row in rows])
     ax.tick_params(axis="y", labelsize="small")
     ax.set_ylim(len(rows) - 0.4, -0.6)
     ax.set_xlabel("rms error [% of stroke fitted]", fontsize="small")
     ax.grid(axis="x", color="0.92", linewidth=0.8)
     ax.set_axisbelow(True)
-    ax.set_title(literal(rows[0].record_title), fontsize="medium", loc="left", pad=18)
-    ax.legend(
-        loc="lower left",
-        bbox_to_anchor=(-0.02, 0.99),
-        ncols=6,
-        fontsize="small",
-        frameon=False,
-        borderaxespad=0.1,
-        columnspacing=1.0,
-        handletextpad=0.3,
-    )
-
-
-def _plain_ticks(ax: Axes) -> None:
-    """Label a logarithmic axis with plain numbers, few enough not to touch."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    low, high = ax.get_xlim()
-    if high < 15.0 * low:
-        subs: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0, 7.0)
-    else:
-        subs = (1.0, 2.0, 5.0) if high < 300.0 * low else (1.0,)
-    ax.xaxis.set_major_locator(LogLocator(subs=subs, numticks=12))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.12g}"))
-    ax.xaxis.set_minor_formatter(NullFormatter())
+    ax.set_title(literal(rows[0].record_title), fontsize="medium", loc="left")
+    legend_inside(ax, ncols=6)
 
 
 def _styles(rows: list[BenchmarkResult]) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import expect, number_pair
 from ..._support.display.frames import frame_of
-from ..._support.display.result import Result
+from ..._support.display.result import Panel, Result
 from ..._support.files.writing import write_result
 from ..._support.statistics import ErrorStatistics
 from ..._support.units import drive_word, shown_unit
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import ArrayLike, NDArray
 
+    from ..._support.display.look import Style, Width
     from ..timing import Timing
     from .tracking import Tracking
 
@@ -231,33 +232,16 @@ class Contour(Result):
         document = self.document() | dict(entries or {})
         return write_result(folder, "contour", document, self.plot(), self.table)
 
-    def plot_path(self, *, ax: Axes | None = None) -> Axes:
-        """Plot the path and the measured positions in the plane, with the smooth start.
+    plot_path = Panel("Plot desired and measured path in the plane.")
 
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw in; default those of a new figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            With the picture.
-
-        Examples
-        --------
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> stage = pt.XYStage.xu_li_2010(seed=1)
-        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-        >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
-        >>> ax = run.plot_path(ax=Figure().subplots())
-        >>> ax.get_ylabel()
-        'y [um]'
-        """
-        return self._panel("plot_path", ax)
-
-    def plot_magnified(self, *, ax: Axes | None = None, factor: float | None = None) -> Axes:
+    def plot_magnified(
+        self,
+        *,
+        ax: Axes | None = None,
+        factor: float | None = None,
+        style: Style | None = None,
+        width: Width | None = None,
+    ) -> Axes:
         """Plot the contour error, magnified, along the path.
 
         Parameters
@@ -266,6 +250,10 @@ class Contour(Result):
             Axes to draw in; default those of a new figure.
         factor : float, optional
             Magnification; default a round number that keeps the errors readable.
+        style : {"screen", "paper"}, optional
+            As in `piezotrack.figure_style`.
+        width : str or float, optional
+            Width of a new figure, as ``"85mm"``; a number is in metres.
 
         Returns
         -------
@@ -281,35 +269,12 @@ class Contour(Result):
         >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
         >>> ax = run.plot_magnified(ax=Figure().subplots())
         >>> ax.get_ylabel()
-        'y [um]'
+        'y [µm]'
         """
-        return self._panel("plot_magnified", ax, factor=factor)
+        axes: Axes = self.view("plot_magnified")(self, ax, factor=factor, style=style, width=width)
+        return axes
 
-    def plot_contour_error(self, *, ax: Axes | None = None) -> Axes:
-        """Plot the measured contour error over the last turn, with mean and standard deviation.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw in; default those of a new figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            With the picture.
-
-        Examples
-        --------
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> stage = pt.XYStage.xu_li_2010(seed=1)
-        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
-        >>> run = pt.contour(stage, (loop, loop), pt.circle(frequency=0.5, radius=10e-6))
-        >>> ax = run.plot_contour_error(ax=Figure().subplots())
-        >>> ax.get_ylabel()
-        'contour error [um]'
-        """
-        return self._panel("plot_contour_error", ax)
+    plot_contour_error = Panel("Plot the contour error over the last turn.")
 
 
 def spread_text(spread: ErrorStatistics) -> str:

@@ -13,7 +13,7 @@ from ... import _core
 from ..._support.arguments import not_negative
 from ..._support.arrays import signal_of
 from ..._support.display.frames import frame_of
-from ..._support.display.result import Result
+from ..._support.display.result import Panel, Result
 from ..._support.files.writing import write_result
 from ..._support.statistics import FIGURES, ErrorStatistics
 from ..._support.units import drive_word, shown_unit
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     from ...references.reference import Reference, SampledReference
@@ -39,7 +38,7 @@ __all__ = ["Metrics", "Tracking"]
 LEARNT = 3
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Metrics(ErrorStatistics):
     """Metrics of a tracked motion; errors are desired less actual.
 
@@ -54,6 +53,14 @@ class Metrics(ErrorStatistics):
 
     phase_lag: float | None
     widest_loop: float | None
+
+    def _rows(self) -> list[tuple[str, str]]:
+        rows = super()._rows()
+        if self.phase_lag is not None:
+            rows.append(("phase lag", f"{math.degrees(self.phase_lag):.3g}\N{DEGREE SIGN}"))
+        if self.widest_loop is not None:
+            rows.append(("widest loop", f"{100.0 * self.widest_loop:.3g} % of travel"))
+        return rows
 
     def __str__(self) -> str:
         text = super().__str__()
@@ -313,109 +320,10 @@ class Tracking(Result):
         document = self.document() | dict(entries or {})
         return write_result(folder, "tracking", document, self.plot(), self.table)
 
-    def plot_motion(self, *, ax: Axes | None = None) -> Axes:
-        """Plot desired and actual displacement over time.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw in; default those of a new figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            With the picture.
-
-        Examples
-        --------
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> stage = pt.DahlStage.xu_li_2010()
-        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
-        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
-        >>> ax = run.plot_motion(ax=Figure().subplots())
-        >>> ax.get_ylabel()
-        'displacement [um]'
-        """
-        return self._panel("plot_motion", ax)
-
-    def plot_error(self, *, ax: Axes | None = None) -> Axes:
-        """Plot the measured tracking error over time, and the largest of each period.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw in; default those of a new figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            With the picture.
-
-        Examples
-        --------
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> stage = pt.DahlStage.xu_li_2010()
-        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
-        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
-        >>> ax = run.plot_error(ax=Figure().subplots())
-        >>> ax.get_ylabel()
-        'tracking error [um]'
-        """
-        return self._panel("plot_error", ax)
-
-    def plot_following(self, *, ax: Axes | None = None) -> Axes:
-        """Plot actual against desired displacement, from the settled time on.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw in; default those of a new figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            With the picture.
-
-        Examples
-        --------
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> stage = pt.DahlStage.xu_li_2010()
-        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
-        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
-        >>> ax = run.plot_following(ax=Figure().subplots())
-        >>> ax.get_ylabel()
-        'measured displacement [um]'
-        """
-        return self._panel("plot_following", ax)
-
-    def plot_effort(self, *, ax: Axes | None = None) -> Axes:
-        """Plot the voltage and its parts over time.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Axes to draw in; default those of a new figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            With the picture.
-
-        Examples
-        --------
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> stage = pt.DahlStage.xu_li_2010()
-        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=stage.inverse())
-        >>> run = pt.track(stage, loop, pt.sine(frequency=0.5, low=0.0, high=50e-6, duration=4.0))
-        >>> ax = run.plot_effort(ax=Figure().subplots())
-        >>> ax.get_ylabel()
-        'voltage [V]'
-        """
-        return self._panel("plot_effort", ax)
+    plot_motion = Panel("Plot desired and measured displacement over time.")
+    plot_error = Panel("Plot the tracking error over time, with its first instants in an inset.")
+    plot_following = Panel("Plot measured against desired displacement, after settling.")
+    plot_effort = Panel("Plot the voltage and its parts over time.")
 
 
 def _metrics(

@@ -7,19 +7,34 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._support.display.plot_style import GREY, panels, whole
+from ..._support.display.plot_style import (
+    GREY,
+    drawing,
+    heading,
+    is_narrow,
+    legend_inside,
+    names_beside,
+    plain_log_ticks,
+    sheet,
+    whole,
+)
 from .comparison_table import short
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import NDArray
 
     from ..comparing.comparison import ControllerComparison
+
+    Array = NDArray[np.float64]
 
 __all__ = ["plot_controllers"]
 
 MARKERS = "osv^Dx"
 
 
+@drawing
 def plot_controllers(
     comparison: ControllerComparison, fig: Figure | SubFigure | None = None
 ) -> Figure:
@@ -27,41 +42,39 @@ def plot_controllers(
 
     Those of all references are relative to the inverse alone; a line spans those of the searches.
     """
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-    from matplotlib.transforms import ScaledTranslation
-
     rows = comparison.rows
-    drawn = panels(fig, (12.0, 2.2 + 0.36 * len(rows)))
-    left, right = drawn.subplots(1, 2)
-    places = np.arange(len(rows))[::-1]
+    size = (12.0, 2.2 + 0.36 * len(rows))
+    least = 1.5 + 0.25 * len(rows)
+    drawn, axes = sheet(fig, size, (("references", "stages"),), least=least)
+    left, right = axes.values()
+    right.sharey(left)
+    places = np.arange(float(len(rows)))[::-1]
     for k, name in enumerate(comparison.references):
         cells = [row.cells[0][k] for row in rows]
         errors = [math.nan if one is None else 1e9 * one.rms for one in cells]
-        left.plot(errors, places, MARKERS[k % len(MARKERS)], label=short(name), alpha=0.8)
+        _marks(left, errors, places, k, len(comparison.references), short(name))
     for k, name in enumerate(comparison.variants):
         errors = [100.0 * row.relative(k) for row in rows]
-        right.plot(errors, places, MARKERS[k % len(MARKERS)], label=name, alpha=0.8)
+        _marks(right, errors, places, k, len(comparison.variants), name)
     ends = [[100.0 * row.searches[i] for row in rows] for i in (0, -1)]
-    right.hlines(places, *ends, color=GREY, zorder=0)
-    # Below the labels, in inches: above any row there may be a mark.
-    below = ScaledTranslation(0.0, -0.5, whole(drawn).dpi_scale_trans)
+    right.hlines(places, ends[0], ends[1], color=GREY, zorder=0)
     titles = ("each reference, as tuned for", "all references, each stage")
-    units = ("true error, nm rms", "true error, % of that of the inverse alone")
+    units = ("true error [nm rms]", "true error [% of the inverse alone]")
     for axis, title, unit in zip((left, right), titles, units, strict=True):
         axis.set_xscale("log")
-        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=6))
-        axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.xaxis.set_minor_formatter(NullFormatter())
+        plain_log_ticks(axis, "x")
         axis.set_ylim(-0.5, len(rows) - 0.5)
         axis.set_xlabel(unit)
-        axis.set_title(title)
+        heading(axis, title)
         axis.grid(axis="y", alpha=0.3)
-        axis.set_yticks(places, [row.name for row in rows] if axis is left else [""] * len(rows))
-        axis.legend(
-            fontsize="small",
-            ncol=3,
-            loc="upper center",
-            bbox_to_anchor=(0.5, 0.0),
-            bbox_transform=axis.transAxes + below,
-        )
+        names_beside(axis, places, [row.name for row in rows])
+        if axis is right and not is_narrow(fig, size):
+            axis.tick_params(labelleft=False)
+        legend_inside(axis, ncols=3)
     return whole(drawn)
+
+
+def _marks(ax: Axes, values: list[float], places: Array, k: int, count: int, label: str) -> None:
+    """Draw the marks of one series, which are above those of the next in each row."""
+    shift = 0.5 * ((count - 1) / 2.0 - k) / max(count, 1)
+    ax.plot(values, places + shift, MARKERS[k % len(MARKERS)], label=label, alpha=0.8)

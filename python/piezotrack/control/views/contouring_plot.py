@@ -11,14 +11,15 @@ from ..._support.display.plot_style import (
     ACTUAL,
     DESIRED,
     ERROR,
-    GUIDE,
     LEVEL,
     QUIET,
     axes_or_new,
-    few_ticks,
+    caption,
+    drawing,
     legend_inside,
     literal,
-    panels,
+    sheet,
+    trace,
     whole,
 )
 
@@ -42,6 +43,7 @@ __all__ = [
 SHOWN = 0.12
 
 
+@drawing
 def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
     """Plot the path and the measured positions in the plane, with the smooth start."""
     (ax,) = axes_or_new(ax, 1)
@@ -49,13 +51,16 @@ def plot_path(run: Contour, ax: Axes | None = None) -> Axes:
     if start.any():
         mark = {**QUIET, "label": "approach"}
         ax.plot(1e6 * run.x.measured[start], 1e6 * run.y.measured[start], **mark)
-    ax.plot(1e6 * run.x.measured[part], 1e6 * run.y.measured[part], **ACTUAL)
+    ax.plot(
+        1e6 * run.x.measured[part], 1e6 * run.y.measured[part], **{**ACTUAL, "label": "measured"}
+    )
     x, y = run.path.outline
     ax.plot(1e6 * x, 1e6 * y, **DESIRED)
     _plane(ax, run)
     return ax
 
 
+@drawing
 def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = None) -> Axes:
     """Plot the contour error, magnified, along the path."""
     (ax,) = axes_or_new(ax, 1)
@@ -79,46 +84,49 @@ def plot_magnified(run: Contour, ax: Axes | None = None, factor: float | None = 
     return ax
 
 
+@drawing
 def plot_contour_error(run: Contour, ax: Axes | None = None) -> Axes:
     """Plot the measured contour error over the last turn, with mean and standard deviation."""
     (ax,) = axes_or_new(ax, 1)
     part = run.last_turn
     found = run.metrics
     mean, sd = 1e6 * found.mean_error, 1e6 * found.sd_error
-    ax.plot(run.t[part], 1e6 * run.error[part], **{**ERROR, "label": "contour error"})
+    error = {**ERROR, "label": "contour error"}
+    trace(
+        ax,
+        run.t[part],
+        1e6 * run.error[part],
+        error,
+        xlabel="time [s]",
+        ylabel="contour error [um]",
+    )
     ax.axhline(mean, **{**LEVEL, "label": "mean"})
     ax.axhspan(mean - sd, mean + sd, color="0.9", zorder=0, label="mean \N{PLUS-MINUS SIGN} SD")
-    ax.set(xlabel="time [s]", ylabel="contour error [um]")
-    ax.margins(x=0)
     legend_inside(ax, ncols=3)
     return ax
 
 
+@drawing
 def plot_contour(run: Contour, fig: Figure | SubFigure | None = None) -> Figure:
     """Plot path, magnified error, errors of the axes and contour error, in the last turn."""
-    figure = panels(fig, (11.0, 8.4))
-    grid = figure.add_gridspec(2, 2, height_ratios=[1.6, 1.0])
-    plot_path(run, figure.add_subplot(grid[0, 0]))
-    plot_magnified(run, figure.add_subplot(grid[0, 1]))
-    part, shared = run.last_turn, None
-    inner = grid[1, 0].subgridspec(2, 1, hspace=0.1)
-    for row, (name, axis) in enumerate((("x", run.x), ("y", run.y))):
-        ax = figure.add_subplot(inner[row], sharex=shared, sharey=shared)
-        ax.plot(run.t[part], 1e6 * axis.error[part], **ERROR)
-        ax.axhline(0.0, **GUIDE)
-        ax.set(xlabel="time [s]" if row else "", ylabel=f"error of {name} [um]")
-        ax.tick_params(labelbottom=bool(row))
-        ax.locator_params(axis="y", nbins=4, prune="both")
-        ax.margins(x=0)
-        shared = shared or ax
-    contour = figure.add_subplot(grid[1, 1])
-    plot_contour_error(run, contour)
+    rows = (("path", "magnified"), ("x", "error"), ("y", "error"))
+    figure, axes = sheet(fig, (11.0, 8.6), rows, heights=(3.2, 1.0, 1.0), least=1.0, down=True)
+    plot_path(run, axes["path"])
+    plot_magnified(run, axes["magnified"])
+    part = run.last_turn
+    axes["y"].sharey(axes["x"])
+    for name, axis in (("x", run.x), ("y", run.y)):
+        error = 1e6 * axis.error[part]
+        trace(axes[name], run.t[part], error, ERROR, zero=True, ylabel=f"error of {name} [um]")
+    axes["y"].set_xlabel("time [s]")
+    plot_contour_error(run, axes["error"])
     metrics = run.metrics
-    figure.suptitle(
+    caption(
+        figure,
         f"{literal(run.path.name)}: {_parts(run)} at {1.0 / run.x.controller.dt:.6g} Hz\n"
         f"contour error {1e6 * metrics.peak_to_peak:.3f} um peak to peak, "
         f"mean {1e6 * metrics.mean_error:.3f} um, SD {1e6 * metrics.sd_error:.3f} um",
-        fontsize="medium",
+        "medium",
     )
     return whole(figure)
 
@@ -138,7 +146,6 @@ def _plane(ax: Axes, run: Contour) -> None:
         xlim=(edges[0][0] - room, edges[0][1] + room),
         ylim=(edges[1][0] - room, edges[1][1] + room),
     )
-    few_ticks(ax, "both")
     legend_inside(ax, ncols=3)
 
 

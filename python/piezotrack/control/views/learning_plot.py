@@ -12,11 +12,13 @@ from ..._support.display.plot_style import (
     FEEDFORWARD,
     GUIDE,
     LEVEL,
+    caption,
+    drawing,
     legend_inside,
     literal,
-    panels,
     plain_log_ticks,
-    thinned,
+    sheet,
+    trace,
     whole,
 )
 from ..._support.units import drive_word, shown_unit
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_learning"]
 
 
+@drawing
 def plot_learning(learning: Learning, fig: Figure | SubFigure | None = None) -> Figure:
     """Plot errors of the first and the best trial, their tables, and the error of all trials.
 
@@ -45,33 +48,25 @@ def plot_learning(learning: Learning, fig: Figure | SubFigure | None = None) -> 
     matplotlib.figure.Figure
         The figure drawn in.
     """
-    figure = panels(fig, (7.2, 7.4))
-    error, table, history = figure.subplots(3, 1)
-    count = learning.learner.t.size
+    figure, axes = sheet(fig, (7.2, 7.4), (("error",), ("table",), ("history",)))
+    controller, t = learning.learner.controller, learning.learner.t
     for run, style, words in (
         (learning.first, ERROR, "first trial"),
         (learning.final, ACTUAL, f"trial {learning.best}"),
     ):
-        last = 1e9 * run.error[-count:]
-        k = thinned(last)
-        error.plot(learning.learner.t[k], last[k], **{**style, "linewidth": 1.0, "label": words})
-    error.axhline(0.0, **GUIDE)
-    error.set(ylabel="desired less\nmeasured [nm]", xlabel="time in the trial [s]")
-    unit, scale = shown_unit(learning.learner.controller.drive_unit)
-    k = thinned(learning.tables[0])
+        line = {**style, "linewidth": 1.0, "label": words}
+        trace(axes["error"], t, 1e9 * run.error[-t.size :], line)
+    unit, scale = shown_unit(controller.drive_unit)
     learnt = scale * (learning.table - learning.learner.feedforward)
-    table.plot(learning.learner.t[k], learnt[k], **{**FEEDFORWARD, "label": "learnt"})
-    table.axhline(0.0, **GUIDE)
-    word = drive_word(learning.learner.controller.drive_unit)
-    table.set(ylabel=f"{word} [{unit}]", xlabel="time in the trial [s]")
-    for ax in (error, table):
-        ax.margins(x=0)
-        legend_inside(ax)
-    _history(learning, history)
-    figure.suptitle(
-        literal(f"{learning.learner.reference.name}: learnt in {len(learning.trials)} trials"),
-        fontsize="medium",
-    )
+    trace(axes["table"], t, learnt, {**FEEDFORWARD, "label": "learnt"})
+    words = f"{drive_word(controller.drive_unit)} [{unit}]"
+    for name, label in (("error", "desired - measured [nm]"), ("table", words)):
+        axes[name].axhline(0.0, **GUIDE)
+        axes[name].set(xlabel="time in the trial [s]", ylabel=label)
+        legend_inside(axes[name])
+    _history(learning, axes["history"])
+    name = learning.learner.reference.name
+    caption(figure, literal(f"{name}: learnt in {len(learning.trials)} trials"), "medium")
     return whole(figure)
 
 
@@ -81,7 +76,7 @@ def _history(learning: Learning, ax: Axes) -> None:
     ax.semilogy(trial, 1e9 * learning.errors, **{**ERROR, "marker": "o", "label": "rms error"})
     noise = [one.noise for one in learning.trials if one.noise is not None]
     if noise and max(noise) > 0.0:
-        ax.axhline(1e9 * float(np.median(noise)), **{**LEVEL, "label": "what does not repeat"})
+        ax.axhline(1e9 * float(np.median(noise)), **{**LEVEL, "label": "noise (not repeatable)"})
     ax.set(xlabel="trial", ylabel="rms error [nm]")
     ax.locator_params(axis="x", integer=True)
     plain_log_ticks(ax)

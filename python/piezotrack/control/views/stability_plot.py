@@ -13,9 +13,10 @@ from ..._support.display.plot_style import (
     GUIDE,
     LEVEL,
     REPETITIVE,
-    folded,
+    caption,
+    drawing,
     legend_inside,
-    panels,
+    sheet,
     whole,
 )
 
@@ -31,6 +32,7 @@ __all__ = ["plot_loop_report"]
 LOWEST = 1e-4
 
 
+@drawing
 def plot_loop_report(report: LoopReport, fig: Figure | SubFigure | None = None) -> Figure:
     """Plot open loop, sensitivity and, with a repetitive part, the error left by a period.
 
@@ -48,8 +50,8 @@ def plot_loop_report(report: LoopReport, fig: Figure | SubFigure | None = None) 
     """
     curves = report.response()
     f = curves.frequency
-    figure = panels(fig, (7.0, 7.4))
-    size, phase, parts = figure.subplots(3, 1, sharex=True)
+    figure, axes = sheet(fig, (7.0, 7.4), (("size",), ("phase",), ("parts",)))
+    size, phase, parts = axes.values()
     dark = {**COMMAND, "color": "0.2", "linewidth": 1.4}
     size.loglog(f, np.abs(curves.open_loop), **{**dark, "label": "open loop |L|"})
     size.axhline(1.0, **GUIDE)
@@ -68,6 +70,9 @@ def plot_loop_report(report: LoopReport, fig: Figure | SubFigure | None = None) 
     parts.axhline(1.0, **GUIDE)
     parts.set(xlabel="frequency [Hz]", ylabel="magnitude")
     _mark_crossover(report, size, phase)
+    for ax in (size, phase):
+        ax.sharex(parts)
+        ax.tick_params(labelbottom=False)
     for ax in (size, parts):
         ax.set_ylim(bottom=max(LOWEST, ax.get_ylim()[0]))
         ax.margins(x=0)
@@ -75,7 +80,7 @@ def plot_loop_report(report: LoopReport, fig: Figure | SubFigure | None = None) 
     legend_inside(phase)
     gain, verdict = str(report.middle).split(": ", 1)
     words = f"{report.controller.title} on a stage of {gain}: {verdict}"
-    figure.suptitle(folded(words, 78), fontsize="medium")
+    caption(figure, words, "medium")
     return whole(figure)
 
 

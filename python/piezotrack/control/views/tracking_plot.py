@@ -14,22 +14,24 @@ from ..._support.display.plot_style import (
     ERROR,
     FEEDBACK,
     FEEDFORWARD,
-    GUIDE,
     LEVEL,
     LIMITS,
     REPETITIVE,
     axes_or_new,
-    few_ticks,
-    heading,
+    caption,
+    drawing,
     legend_inside,
     literal,
-    panels,
+    sheet,
     thinned,
+    trace,
     whole,
 )
 from ..._support.units import best_length_unit, drive_word, shown_unit
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 __all__ = [
     "plot_effort",
     "plot_error",
+    "plot_feedforward",
     "plot_following",
     "plot_motion",
     "plot_tracking",
@@ -50,68 +53,74 @@ __all__ = [
 CROPPED = 5.0
 
 
+@drawing
 def plot_motion(run: Tracking, ax: Axes | None = None) -> Axes:
-    """Plot desired and actual displacement over time."""
+    """Plot desired and measured displacement over time."""
     (ax,) = axes_or_new(ax, 1)
-    kept = thinned(run.fine_displacement)
-    ax.plot(run.fine_t[kept], 1e6 * run.fine_displacement[kept], **ACTUAL)
-    ax.plot(run.t, 1e6 * run.desired, **DESIRED)
-    ax.set(xlabel="time [s]", ylabel="displacement [um]")
+    trace(ax, run.t, 1e6 * run.measured, {**ACTUAL, "label": "measured"})
+    trace(ax, run.t, 1e6 * run.desired, DESIRED, ylabel="displacement [um]")
     _over_time(ax, run)
     return ax
 
 
+@drawing
 def plot_error(run: Tracking, ax: Axes | None = None) -> Axes:
-    """Plot the measured tracking error over time, and the largest of each period."""
+    """Plot the measured tracking error over time, and the largest of each period.
+
+    Where the first instants are beyond the rest, an inset shows them.
+    """
     (ax,) = axes_or_new(ax, 1)
-    ax.plot(run.t, 1e6 * run.error, **{**ERROR, "label": "desired - measured"})
+    error = {**ERROR, "label": "desired - measured"}
+    trace(ax, run.t, 1e6 * run.error, error, zero=True, ylabel="tracking error [um]")
     period = run.reference.period
     for i, figures in enumerate(run.periods):
         assert period is not None
         span = (i * period, min((i + 1) * period, _end(run)))
         label = None if i else "largest of each period"
         ax.plot(span, 2 * [1e6 * figures.max_error], **{**LEVEL, "label": label})
-    ax.axhline(0.0, **GUIDE)
-    ax.set(xlabel="time [s]", ylabel="tracking error [um]")
-    _crop_start(ax, run)
+    _show_start(ax, run)
     _shade_clipped(ax, run)
     _over_time(ax, run, ncols=2)
     return ax
 
 
+@drawing
 def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
-    """Plot actual against desired displacement, from the settled time on."""
+    """Plot measured against desired displacement, from the settled time on."""
     (ax,) = axes_or_new(ax, 1)
     part = run.t >= run.settled
     ax.plot(1e6 * run.desired[part], 1e6 * run.measured[part], **{**ACTUAL, "label": "measured"})
     ends = np.array([run.desired.min(), run.desired.max()]) * 1e6
     ax.plot(ends, ends, **{**DESIRED, "label": "measured = desired"})
     ax.set(xlabel="desired displacement [um]", ylabel="measured displacement [um]")
-    few_ticks(ax)
     ax.legend(loc="upper left", frameon=False, fontsize="small")
     return ax
 
 
+@drawing
 def plot_effort(run: Tracking, ax: Axes | None = None) -> Axes:
     """Plot the voltage and its parts over time."""
     (ax,) = axes_or_new(ax, 1)
     unit, scale = shown_unit(run.controller.drive_unit)
-    ax.step(run.t, scale * run.voltage, where="post", **COMMAND)
     parts = (
+        (run.voltage, COMMAND),
         (run.feedforward, FEEDFORWARD),
         (run.feedback, FEEDBACK),
         (run.repetitive, REPETITIVE),
     )
     for voltage, style in parts:
-        if np.any(voltage):
-            ax.step(run.t, scale * voltage, where="post", **style)
-    what = drive_word(run.controller.drive_unit)
-    ax.set(xlabel="time [s]", ylabel=f"{what} [{unit}]")
+        if voltage is run.voltage or np.any(voltage):
+            trace(ax, run.t, scale * voltage, style, steps=True)
+    ax.set_ylabel(f"{drive_word(run.controller.drive_unit)} [{unit}]")
     if run.saturated.any():
-        for i, limit in enumerate(run.controller.limits):
-            ax.axhline(scale * limit, **{**LIMITS, "label": None if i else "limits"})
+        _limits(ax, run.controller.limits, scale)
     _over_time(ax, run)
     return ax
+
+
+def _limits(ax: Axes, limits: Sequence[float], scale: float) -> None:
+    for i, limit in enumerate(limits):
+        ax.axhline(scale * limit, **{**LIMITS, "label": None if i else "limits"})
 
 
 def _end(run: Tracking) -> float:
@@ -119,19 +128,29 @@ def _end(run: Tracking) -> float:
     return float(run.t[-1]) + run.controller.dt
 
 
-def _crop_start(ax: Axes, run: Tracking) -> None:
-    """Scale the error to the settled one, where that of the way to the reference would hide it."""
+def _show_start(ax: Axes, run: Tracking) -> None:
+    """Scale the error to the settled one, with the first instants in an inset above it."""
     error = 1e6 * np.abs(run.error)
     largest, settled = float(error.max()), float(error[run.t >= run.settled].max())
-    if largest > CROPPED * settled > 0.0:
-        ax.set_ylim(-1.6 * settled, 1.6 * settled)
-        heading(ax, f"before {run.settled:g} s up to {largest:.3g} um, cropped")
+    if not largest > CROPPED * settled > 0.0:
+        return
+    ax.set_ylim(-1.4 * settled, 4.9 * settled)
+    end = _end(run)
+    inset = ax.inset_axes(
+        (0.42 * end, 2.5 * settled, 0.55 * end, 2.2 * settled), transform=ax.transData
+    )
+    # From the first sample until the error is that of the rest.
+    last = min(int(np.flatnonzero(error > CROPPED * settled)[-1]) + 3, run.t.size - 1)
+    first = run.t <= max(float(run.t[last]), 5.0 * run.controller.dt)
+    trace(inset, 1e3 * run.t[first], 1e6 * run.error[first], ERROR, zero=True)
+    inset.set_xlabel("first instants [ms]", fontsize="small", labelpad=1.0)
+    inset.tick_params(labelsize="small", length=2.0, pad=1.5)
+    inset.margins(y=0.12)
 
 
 def _over_time(ax: Axes, run: Tracking, ncols: int = 3) -> None:
     """Let the time axis end where the run does, and put the legend into the axes."""
-    ax.set_xlim(0.0, _end(run))
-    few_ticks(ax)
+    ax.set(xlim=(0.0, _end(run)), xlabel="time [s]")
     legend_inside(ax, ncols)
 
 
@@ -144,6 +163,7 @@ def _shade_clipped(ax: Axes, run: Tracking) -> None:
         ax.axvspan(times[first], times[last], **style)
 
 
+@drawing
 def plot_feedforward(
     t: Array,
     voltage: Array,
@@ -152,8 +172,9 @@ def plot_feedforward(
     *,
     title: str = "Feedforward",
     drive_unit: str = "V",
+    limits: Sequence[float] | None = None,
 ) -> Figure:
-    """Plot a feedforward over time and over the reference.
+    """Plot reference and feedforward over time, and the feedforward over the reference.
 
     Parameters
     ----------
@@ -165,38 +186,44 @@ def plot_feedforward(
         Title of the picture.
     drive_unit : str, optional
         Unit of the drive, SI.
+    limits : (float, float), optional
+        Limits of the drive, which are drawn.
 
     Returns
     -------
     matplotlib.figure.Figure
         The figure drawn in.
     """
-    figure = panels(fig, (11.0, 4.2))
-    left, right = figure.subplots(1, 2)
+    rows = (("reference", "over"), ("drive", "over"))
+    figure, axes = sheet(fig, (11.0, 4.8), rows, widths=(1.35, 1.0), down=True)
     unit, scale = shown_unit(drive_unit)
-    what = drive_word(drive_unit).capitalize()
-    left.step(t, scale * voltage, where="post", **FEEDFORWARD)
-    left.set(xlabel="time [s]", ylabel=f"feedforward [{literal(unit)}]")
-    heading(left, f"{what} over time")
-    left.margins(x=0)
-    right.plot(1e6 * x, scale * voltage, **FEEDFORWARD)
-    right.set(xlabel="reference [um]", ylabel=f"feedforward [{literal(unit)}]")
-    heading(right, f"{what} over reference")
-    few_ticks(right)
-    figure.suptitle(literal(title), fontsize="large")
+    label = f"{drive_word(drive_unit)} [{literal(unit)}]"
+    reference = {**DESIRED, "linestyle": "-"}
+    trace(axes["reference"], t, 1e6 * x, reference, ylabel="reference [um]")
+    drive = axes["drive"]
+    trace(drive, t, scale * voltage, FEEDFORWARD, steps=True, xlabel="time [s]", ylabel=label)
+    drive.sharex(axes["reference"])
+    kept = thinned(voltage)
+    axes["over"].plot(1e6 * x[kept], scale * voltage[kept], **FEEDFORWARD)
+    axes["over"].set(xlabel="reference [um]", ylabel=label)
+    for ax in (drive, axes["over"]) if limits is not None else ():
+        _limits(ax, limits or (), scale)
+        legend_inside(ax, ncols=2)
+    caption(figure, literal(title))
     return whole(figure)
 
 
+@drawing
 def plot_tracking(run: Tracking, fig: Figure | SubFigure | None = None) -> Figure:
-    """Plot all four: motion, error, actual against desired, voltage."""
-    figure = panels(fig, (11.0, 7.0))
-    axes = figure.subplots(2, 2)
-    plot_motion(run, axes[0, 0])
-    plot_following(run, axes[0, 1])
-    plot_error(run, axes[1, 0])
-    plot_effort(run, axes[1, 1])
+    """Plot all four: motion, error, measured against desired, voltage."""
+    rows = (("motion", "following"), ("error", "effort"))
+    figure, axes = sheet(fig, (11.0, 7.0), rows, down=True)
+    plot_motion(run, axes["motion"])
+    plot_following(run, axes["following"])
+    plot_error(run, axes["error"])
+    plot_effort(run, axes["effort"])
     since = f"from {run.settled:g} s on: " if run.settled else ""
-    figure.suptitle(f"{_title(run)}\n{since}{run.metrics}", fontsize="medium")
+    caption(figure, f"{_title(run)}\n{since}{run.metrics}", "medium")
     return whole(figure)
 
 

@@ -10,10 +10,11 @@ from ..._support.display.plot_style import (
     ACTUAL,
     COMMAND,
     ERROR,
+    drawing,
     heading,
     legend_inside,
-    panels,
     plain_log_ticks,
+    sheet,
     whole,
 )
 from ..._support.statistics import ErrorStatistics
@@ -73,10 +74,11 @@ def tuned_text(tuned: Tuned) -> str:
     return "\n".join(lines)
 
 
+@drawing
 def plot_tuned(tuned: Tuned, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw the figure that was made small, of the best controller after each iteration."""
-    figure = panels(fig, (6.4, 4.2))
-    ax = figure.subplots()
+    figure, axes = sheet(fig, (6.4, 4.2), (("all",),))
+    ax = axes["all"]
     scale, unit = _shown(tuned) if tuned.runs else (tuned.controller.dt, "m s/V")
     values = scale * np.array(tuned.history)
     shown = np.isfinite(values)
@@ -96,10 +98,11 @@ def schedule_text(found: Schedule) -> str:
     return "\n".join(f"{axis}\n{one}" for axis, one in zip("xy", tables, strict=True))
 
 
+@drawing
 def plot_schedule(schedule: Schedule, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw the errors with the fixed and with the scheduled gains over the rate."""
-    figure = panels(fig, (6.4, 4.2))
-    ax = figure.subplots()
+    figure, axes = sheet(fig, (6.4, 4.2), (("all",),))
+    ax = axes["all"]
     for i, (amplitude, errors) in enumerate(zip(schedule.amplitudes, schedule.errors, strict=True)):
         for column, style, words in ((0, COMMAND, "fixed"), (1, ACTUAL, "scheduled")):
             label = f"{words}, {1e6 * amplitude:g} um"

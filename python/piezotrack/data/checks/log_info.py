@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import re
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..._support.arrays import check_dt, time_fault
 from ..._support.display.table import Column as Cells
-from ..._support.display.table import Table
+from ..._support.display.table import Table, words
 from ..._support.messages import quoted
 from ..._support.units import drive_text, drive_word, length_text, lookup
 from ...errors import DataError, ParameterError, PiezotrackError
@@ -78,7 +78,7 @@ class ColumnInfo:
     missing: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LogInfo:
     """Contents of a log.
 
@@ -117,6 +117,30 @@ class LogInfo:
     determines: tuple[str, ...]
     notes: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        rate = "" if self.time is None else f", {1.0 / self.time.interval:.6g} Hz"
+        fault = "; not read as it is" if self.problem else ""
+        samples = max(column.samples for column in self.columns)
+        what = f"{self.format}, {len(self.columns)} columns, {samples} samples{rate}{fault}"
+        return f"<LogInfo, {self.source}: {what}; see summary()>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            *((f"column of the {role}", title) for role, title in self.roles.items()),
+            *(line.split("  ", 1) for line in [*self._of_time(), *self._of_drive()]),
+            *(("can determine", one) for one in self.determines),
+            *(("note", note) for note in self.notes),
+            *([("not read as it is", self.problem)] if self.problem else []),
+        ]
+        told = [(name.strip(), text.strip()) for name, text in rows]
+        return (
+            replace(self._table, title=f"{self.source}, {self.format}").html()
+            + words("", told).html()
+        )
+
+    def __str__(self) -> str:
+        return self.summary()
+
     def summary(self) -> str:
         """Write all of it for a person.
 
@@ -125,8 +149,26 @@ class LogInfo:
         str
             Several lines.
         """
+        lines = [
+            f"{self.source}  {self.format}, {len(self.columns)} columns",
+            "",
+            *self._table.lines(),
+        ]
+        lines += ["", *self._of_time(), *self._of_drive()]
+        if self.determines:
+            lines += ["", "can determine", *(f"  {text}" for text in self.determines)]
+            if self.drive is not None and self.drive.turns and self.stroke:
+                lines.append("  for what is not in it, with a first model: piezotrack suggest")
+        lines += [f"note  {note}" for note in self.notes]
+        if self.problem:
+            lines += ["", f"is not read as it is: {self.problem}"]
+        return "\n".join(lines)
+
+    @property
+    def _table(self) -> Table:
+        """The columns."""
         width = min(60, max(len(_shown(column.title)) for column in self.columns))
-        table = Table(
+        return Table(
             (
                 Cells("column", width=width, before=0, left=True),
                 Cells("unit", width=5, left=True),
@@ -147,16 +189,6 @@ class LogInfo:
                 for column in self.columns
             ],
         )
-        lines = [f"{self.source}  {self.format}, {len(self.columns)} columns", "", *table.lines()]
-        lines += ["", *self._of_time(), *self._of_drive()]
-        if self.determines:
-            lines += ["", "can determine", *(f"  {text}" for text in self.determines)]
-            if self.drive is not None and self.drive.turns and self.stroke:
-                lines.append("  for what is not in it, with a first model: piezotrack suggest")
-        lines += [f"note  {note}" for note in self.notes]
-        if self.problem:
-            lines += ["", f"is not read as it is: {self.problem}"]
-        return "\n".join(lines)
 
     def document(self) -> dict[str, Any]:
         """Return the same as numbers, texts, lists and dicts, in SI but for the columns.
@@ -229,6 +261,7 @@ def info(
     units: Mapping[str | int, str] | None = None,
     dt: float | None = None,
     missing: Missing = None,
+    skip: int = 0,
 ) -> LogInfo:
     """Look into a log: columns, sampling, what the drive does, and what it can determine.
 
@@ -237,7 +270,7 @@ def info(
 
     Parameters
     ----------
-    path, time, drive, displacement, units, dt, missing
+    path, time, drive, displacement, units, dt, missing, skip
         As in `piezotrack.read`.
 
     Returns
@@ -265,7 +298,7 @@ def info(
     >>> print(found.determines[1])
     one amplitude, 60 V: no smaller loops; weights of small plays are those of this loop
     """
-    log = Log(path)
+    log = Log(path, skip)
     given = {"time": time, "drive": drive, "displacement": displacement}
     roles: dict[str, Column] = {}
     problems: list[str] = []

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .binary import afm, hdf5, mat, mdf, npz, parquet, tdms
+from .binary import afm, hdf5, mat, mdf, npz, parquet, tdms, xlsx
 from .source import Source
-from .text import delimited, gcs, lvm, waveforms
+from .text import delimited, gcs, lvm, oscilloscope, waveforms
 
 if TYPE_CHECKING:
     import os
@@ -30,15 +30,24 @@ FORMATS: tuple[Format, ...] = (
     tdms.FORMAT,
     mdf.FORMAT,
     afm.FORMAT,
+    xlsx.FORMAT,
     gcs.FORMAT,
     lvm.FORMAT,
     waveforms.FORMAT,
+    oscilloscope.FORMAT,
     delimited.FORMAT,
 )
 
 
 def format_of(source: Source) -> Format:
-    """Return the format of a file, by its first bytes or by the ending of its name."""
+    """Return the format of a file, by its first bytes or by the ending of its name.
+
+    Where lines are skipped it is a spreadsheet, or text of columns and no other format of text.
+    """
+    if source.skip:
+        if xlsx.FORMAT.begins(source.head):
+            return xlsx.FORMAT
+        return delimited.FORMAT
     for known in FORMATS:
         if known.begins(source.head):
             return known
@@ -48,13 +57,15 @@ def format_of(source: Source) -> Format:
     return delimited.FORMAT
 
 
-def open_log(path: str | os.PathLike[str]) -> Table:
+def open_log(path: str | os.PathLike[str], skip: int = 0) -> Table:
     """Open a log of any format.
 
     Parameters
     ----------
     path : path-like
         The file.
+    skip : int, optional
+        Lines or rows at its beginning that are left out.
 
     Returns
     -------
@@ -68,7 +79,7 @@ def open_log(path: str | os.PathLike[str]) -> Table:
     ParameterError
         `path` is no name of a file.
     """
-    source = Source(path)
+    source = Source(path, skip)
     if not source.size:
         raise source.error("is empty: expected a log")
     if source.head.lstrip().startswith(b"{") and b'"piezotrack-' in source.head:

@@ -8,6 +8,7 @@ import logging
 import os
 import warnings
 from contextlib import contextmanager
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -52,6 +53,8 @@ class Source:
     ----------
     path : path-like
         Its name.
+    skip : int, optional
+        Lines or rows at its beginning that are left out.
 
     Attributes
     ----------
@@ -63,6 +66,8 @@ class Source:
         Its length [bytes].
     head : bytes
         Its first bytes.
+    skip : int
+        Lines or rows at its beginning that are left out.
 
     Raises
     ------
@@ -72,7 +77,8 @@ class Source:
         There is no such file, it is a directory, or it cannot be read.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], skip: int = 0) -> None:
+        self.skip = _lines(skip)
         try:
             self.path = Path(path)
         except TypeError:
@@ -235,6 +241,12 @@ class Source:
             if isinstance(error, PiezotrackError):
                 raise
             raise self.error(f"cannot be read: {error}") from None
+
+
+def _lines(skip: object) -> int:
+    if isinstance(skip, bool) or not isinstance(skip, Integral) or int(skip) < 0:
+        raise ParameterError("skip", quoted(skip), "a number of lines, 0 or more")
+    return int(skip)
 
 
 def _loggers(name: str | None) -> list[logging.Logger]:

@@ -147,6 +147,18 @@ class Table(ABC):
     def count(self, column: Column) -> int:
         """Return the number of samples of a column."""
 
+    def is_empty(self, column: Column) -> bool:
+        """Whether a column has no reading at all."""
+        try:
+            return bool(np.isnan(self.column(column)).all())
+        except DataError:
+            # One that cannot be read is not known to be empty.
+            return False
+
+    def above(self) -> int | None:
+        """Return how many lines seem to be above the titles, where those found seem to be none."""
+        return None
+
     def interval(self, main: Sequence[Column]) -> float | None:
         """Return the sampling interval that the file states for columns [s], or None."""
         del main

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 from ..._support.display.plot_style import (
     COMMAND,
     RECORDED,
-    few_ticks,
+    caption,
+    drawing,
     heading,
     literal,
-    panels,
+    sheet,
     thinned,
+    trace,
     whole,
 )
 from ..._support.units import best_length_unit, shown_unit
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_dataset"]
 
 
+@drawing
 def plot_dataset(data: Dataset, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw drive and displacement over time, and displacement over drive.
 
@@ -39,33 +42,26 @@ def plot_dataset(data: Dataset, fig: Figure | SubFigure | None = None) -> Figure
     matplotlib.figure.Figure
         The figure drawn in.
     """
-    figure = panels(fig, (11.0, 4.8))
-    grid = figure.add_gridspec(2, 2, width_ratios=[1.35, 1.0])
-    drive = figure.add_subplot(grid[0, 0])
-    displacement = figure.add_subplot(grid[1, 0], sharex=drive)
-    loop = figure.add_subplot(grid[:, 1])
+    rows = (("drive", "loop"), ("displacement", "loop"))
+    figure, axes = sheet(fig, (11.0, 4.8), rows, widths=(1.35, 1.0), down=True)
+    drive, displacement, loop = (axes[name] for name in ("drive", "displacement", "loop"))
+    drive.sharex(displacement)
     unit, scale = best_length_unit(data.stroke)
     name, times = shown_unit(data.drive_unit)
     u = times * data.u
-    kept = thinned(u)
-    how = "steps-post" if data.hold == "zoh" else "default"
-    dark = {**COMMAND, "color": "0.2", "linewidth": 1.1}
-    drive.plot(data.t[kept], u[kept], drawstyle=how, **dark)
-    kept = thinned(data.y)
-    displacement.plot(data.t[kept], scale * data.y[kept], **RECORDED)
-    loop.plot(u[kept], scale * data.y[kept], **RECORDED)
+    y = scale * data.y
     of_drive, in_metres = f"drive [{literal(name)}]", f"displacement [{unit}]"
-    drive.set(ylabel=of_drive)
-    displacement.set(xlabel="time [s]", ylabel=in_metres)
+    dark = {**COMMAND, "color": "0.2", "linewidth": 1.1}
+    trace(drive, data.t, u, dark, steps=data.hold == "zoh", ylabel=of_drive)
+    trace(displacement, data.t, y, RECORDED, xlabel="time [s]", ylabel=in_metres)
+    kept = thinned(y)
+    loop.plot(u[kept], y[kept], **RECORDED)
     loop.set(xlabel=of_drive, ylabel=in_metres)
     for ax, words in ((drive, "Drive"), (displacement, "Displacement"), (loop, "Hysteresis loop")):
         heading(ax, words)
-    for ax in (drive, displacement):
-        ax.margins(x=0.0)
-    few_ticks(loop)
-    figure.suptitle(
+    caption(
+        figure,
         f"{literal(data.source or 'Record')}: {data.duration:.6g} s at {1.0 / data.dt:.6g} Hz, "
         f"stroke {scale * data.stroke:.3g} {unit}",
-        fontsize="large",
     )
     return whole(figure)

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ... import _core
-from ..._support.display.result import Result
+from ..._support.display.result import Panel, Result
 from ..._support.files.writing import make_folder, result_set, save_figures, write_document
 from ..._support.messages import quoted
 from ...data.dataset import Dataset
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import numpy as np
-    from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -121,8 +120,8 @@ class StepResult(Result):
     views: ClassVar[Mapping[str, str]] = {
         "summary": "identification.views.experiments.step_report:step_text",
         "plot": "identification.views.experiments.step_plot:plot_step_result",
-        "step": "identification.views.experiments.step_plot:plot_step",
-        "spectrum": "identification.views.experiments.step_plot:plot_spectrum",
+        "plot_step": "identification.views.experiments.step_plot:plot_step",
+        "plot_spectrum": "identification.views.experiments.step_plot:plot_spectrum",
     }
 
     readings: StepReadings
@@ -265,67 +264,8 @@ class StepResult(Result):
             )
         return notes
 
-    def plot_step(self, *, ax: Axes | None = None) -> Axes:
-        """Draw the displacement after the step, with the peaks and the level it ends at.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; a new figure where not given.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes drawn on.
-
-        Raises
-        ------
-        ParameterError
-            The readings were entered by hand: there is no record to draw.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> u = np.where(np.arange(1600) < 100, 0.0, 75.0)
-        >>> step = pt.identify_step(pt.VirtualStage.xu_li_2010(seed=1).record(u, 2e-4, hold="zoh"))
-        >>> step.plot_step(ax=Figure().subplots()).get_xlabel()
-        'time after the step [ms]'
-        """
-        drawn: Axes = self.view("step")(self, ax)
-        return drawn
-
-    def plot_spectrum(self, *, ax: Axes | None = None) -> Axes:
-        """Draw the gain over the frequency, with the resonance and the static gain.
-
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; a new figure where not given.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes drawn on.
-
-        Raises
-        ------
-        ParameterError
-            The readings were entered by hand: there is no record to draw.
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> u = np.where(np.arange(1600) < 100, 0.0, 75.0)
-        >>> step = pt.identify_step(pt.VirtualStage.xu_li_2010(seed=1).record(u, 2e-4, hold="zoh"))
-        >>> step.plot_spectrum(ax=Figure().subplots()).get_ylabel()
-        'gain [um/V]'
-        """
-        drawn: Axes = self.view("spectrum")(self, ax)
-        return drawn
+    plot_step = Panel("Draw the displacement after the step, with its peaks.")
+    plot_spectrum = Panel("Draw the gain over the frequency, with the resonance.")
 
     def document(self) -> dict[str, Any]:
         """Content of the JSON file: readings and results, SI.

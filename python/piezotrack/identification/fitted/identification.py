@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ... import _core
+from ..._support.display.result import Panel
 from ..._support.statistics import sample_noise
 from ...data.checks import diagnostics
 from ...data.checks.connections import unusual_connection
@@ -26,10 +27,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
+    from ..._support.display.look import Style, Width
     from ..._support.display.result import Result
     from ...data.dataset import Dataset
     from ...stages.motion import Response
@@ -85,7 +86,7 @@ class Identification(IdentifiedModel):
         **IdentifiedModel.views,
         "summary": "identification.views.report:summary_text",
         "html": "identification.views.html:identification_html",
-        "convergence": "identification.views.plot:plot_convergence",
+        "plot_convergence": "identification.views.plot:plot_convergence",
         "residual": "identification.views.confidence.residual_plot:plot_fit_residual",
         "report": "identification.views.report_page.page:write_report",
     }
@@ -282,38 +283,16 @@ class Identification(IdentifiedModel):
             return f"all {method.rounds} rounds were done"
         return self.stop_reason
 
-    def plot_convergence(self, *, ax: Axes | None = None) -> Axes:
-        """Draw the best cost after each iteration, and where the other restarts ended.
+    plot_convergence = Panel("Draw the best cost of a search after each iteration.")
 
-        Parameters
-        ----------
-        ax : matplotlib.axes.Axes, optional
-            Where to draw; a new figure where not given.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            The axes drawn on.
-
-        Raises
-        ------
-        ParameterError
-            The model was not searched.
-
-        Examples
-        --------
-        >>> from matplotlib.figure import Figure
-        >>> import piezotrack as pt
-        >>> log = pt.datasets.dbo_training()[3.0:5.0]
-        >>> few = pt.ParticleSwarm(iterations=3, runs=1, seed=1)
-        >>> fit = pt.identify(log, "dahl", method=few, progress=False)
-        >>> fit.plot_convergence(ax=Figure().subplots()).get_ylabel()
-        'best cost, rms [um]'
-        """
-        drawn: Axes = self.view("convergence")(self, ax)
-        return drawn
-
-    def plot_residual(self, *, record: int = 0, fig: Figure | SubFigure | None = None) -> Figure:
+    def plot_residual(
+        self,
+        *,
+        record: int = 0,
+        fig: Figure | SubFigure | None = None,
+        style: Style | None = None,
+        width: Width | None = None,
+    ) -> Figure:
         """Draw the residual against time, drive, rate and amplitude, and say what explains it.
 
         `piezotrack.identification.residual_of` has the numbers.
@@ -324,6 +303,10 @@ class Identification(IdentifiedModel):
             Which of several records, from 0.
         fig : matplotlib.figure.Figure or SubFigure, optional
             Where to draw; a new figure of pyplot where not given.
+        style : {"screen", "paper"}, optional
+            As in `piezotrack.figure_style`.
+        width : str or float, optional
+            Width of a new figure, as ``"85mm"``; a number is in metres.
 
         Returns
         -------
@@ -344,7 +327,7 @@ class Identification(IdentifiedModel):
         >>> len(fit.plot_residual(fig=Figure(layout="constrained")).axes)
         6
         """
-        drawn: Figure = self.view("residual")(self, record, fig)
+        drawn: Figure = self.view("residual")(self, record, fig, style=style, width=width)
         return drawn
 
     def report(

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import ArrayLike
 
+    from ..._support.display.look import Style, Width
     from ...data.dataset import Dataset
     from .certainty.confidence import Confidence
     from .certainty.prediction_band import PredictionBand
@@ -74,7 +75,14 @@ class ModelViews(Result):
         intervals: Confidence = self.view("confidence")(self, level, method)
         return intervals
 
-    def plot(self, data: Dataset | None = None, *, fig: Figure | SubFigure | None = None) -> Figure:
+    def plot(
+        self,
+        data: Dataset | None = None,
+        *,
+        fig: Figure | SubFigure | None = None,
+        style: Style | None = None,
+        width: Width | None = None,
+    ) -> Figure:
         """Loop, displacement with its error over time, and convergence of a search.
 
         Of several records loop and displacement of each, one below the other.
@@ -86,6 +94,10 @@ class ModelViews(Result):
             has none.
         fig : matplotlib.figure.Figure or SubFigure, optional
             Where to draw; a new figure of pyplot where not given.
+        style : {"screen", "paper"}, optional
+            As in `piezotrack.figure_style`.
+        width : str or float, optional
+            Width of a new figure, as ``"85mm"``; a number is in metres.
 
         Returns
         -------
@@ -97,10 +109,17 @@ class ModelViews(Result):
         ParameterError
             There is no record.
         """
-        figure: Figure = self.view("plot")(self, data, fig)
+        figure: Figure = self.view("plot")(self, data, fig, style=style, width=width)
         return figure
 
-    def plot_loop(self, data: Dataset | None = None, *, ax: Axes | None = None) -> Axes:
+    def plot_loop(
+        self,
+        data: Dataset | None = None,
+        *,
+        ax: Axes | None = None,
+        style: Style | None = None,
+        width: Width | None = None,
+    ) -> Axes:
         """Draw the hysteresis loop: displacement over drive, measured and simulated.
 
         Parameters
@@ -109,6 +128,10 @@ class ModelViews(Result):
             As of `plot`.
         ax : matplotlib.axes.Axes, optional
             Where to draw; a new figure where not given.
+        style : {"screen", "paper"}, optional
+            As in `piezotrack.figure_style`.
+        width : str or float, optional
+            Width of a new figure, as ``"85mm"``; a number is in metres.
 
         Returns
         -------
@@ -128,13 +151,18 @@ class ModelViews(Result):
         >>> fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
         >>> ax = fit.plot_loop(ax=Figure().subplots())
         >>> ax.get_xlabel(), ax.get_ylabel()
-        ('drive [V]', 'displacement [um]')
+        ('drive [V]', 'displacement [µm]')
         """
-        drawn: Axes = self.view("loop")(self, data, ax)
+        drawn: Axes = self.view("loop")(self, data, ax, style=style, width=width)
         return drawn
 
     def plot_time(
-        self, data: Dataset | None = None, *, axes: Sequence[Axes] | None = None
+        self,
+        data: Dataset | None = None,
+        *,
+        axes: Sequence[Axes] | None = None,
+        style: Style | None = None,
+        width: Width | None = None,
     ) -> tuple[Axes, Axes]:
         """Draw measured and simulated displacement over time, and the error below.
 
@@ -144,6 +172,10 @@ class ModelViews(Result):
             As of `plot`.
         axes : two matplotlib.axes.Axes, optional
             Where to draw; a new figure where not given.
+        style : {"screen", "paper"}, optional
+            As in `piezotrack.figure_style`.
+        width : str or float, optional
+            Width of a new figure, as ``"85mm"``; a number is in metres.
 
         Returns
         -------
@@ -165,7 +197,7 @@ class ModelViews(Result):
         >>> below.get_ylabel()
         'error [nm]'
         """
-        drawn: tuple[Axes, Axes] = self.view("time")(self, data, axes)
+        drawn: tuple[Axes, Axes] = self.view("time")(self, data, axes, style=style, width=width)
         return drawn
 
     def prediction_band(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..._support.display.table import words
 from .notes import fit_percent
 
 __all__ = ["Score", "share_fitted"]
@@ -53,7 +54,7 @@ class Score:
 
     @property
     def fit_percent(self) -> float:
-        """Share of the motion that the model explains, 100 (1 - |y - x| / |y - mean y|) [%].
+        """Share of the motion that the model explains, ``100 (1 - |y - x| / |y - mean y|)`` [%].
 
         100 for an exact model; 0 for one that is no better than the mean of the record.
         """
@@ -61,6 +62,23 @@ class Score:
 
     def __repr__(self) -> str:
         return f"<Score, {self}>"
+
+    def _repr_html_(self) -> str:
+        micro = "\N{MICRO SIGN}m"
+        stroke = "% of stroke"
+        rows = [
+            ("rms error", f"{1e6 * self.rms:.4g} {micro}, {self.rms_percent:.3g} {stroke}"),
+            (
+                "largest error",
+                f"{1e6 * self.max_error:.4g} {micro}, {self.max_percent:.3g} {stroke}",
+            ),
+            ("at", f"{self.max_error_time:.6g} s"),
+            ("fit", f"{self.fit_percent:.4g} %"),
+            ("offset", f"{1e6 * self.offset:.4g} {micro}"),
+            ("record", share_fitted(self.fitted_share)),
+            *(("note", note) for note in self.notes),
+        ]
+        return words("Score", [row for row in rows if not row[1].startswith("nan")]).html()
 
     def __str__(self) -> str:
         fit = "" if math.isnan(self.spread) else f", fit {self.fit_percent:.4g} %"

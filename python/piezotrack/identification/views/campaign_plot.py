@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..._support.display.plot_style import (
     GUIDE,
+    LEVEL,
     MODELS,
-    few_ticks,
-    folded,
+    caption,
+    drawing,
     heading,
+    is_narrow,
+    legend_inside,
     literal,
-    panels,
+    names_beside,
+    sheet,
     whole,
 )
 from ..campaigns.result import size_of
@@ -27,14 +32,15 @@ if TYPE_CHECKING:
 __all__ = ["plot_campaign"]
 
 MARKERS = "osD^vP"
+# Records of one model that are listed by their names; more are drawn along an axis.
+LISTED = 6
 # Records that are named beside their lines; more are numbered.
 NAMED = 40
-# Letters of a name.
-LABEL = 28
 # A cost this far above the lowest is drawn, in per cent; a seed without a difference is put here.
 EQUAL = 1e-3
 
 
+@drawing
 def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw the costs of a campaign.
 
@@ -51,19 +57,46 @@ def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> 
         The figure drawn in.
     """
     several = any(len(group) > 1 for group in campaign.groups.values())
+    if not several and len(campaign.models) == 1 and len(campaign.records) > LISTED:
+        return _along(campaign, fig)
     height = 2.3 + min(0.35 * len(campaign.records), 9.0)
-    figure = panels(fig, (11.0 if several else 7.5, height))
-    axes = figure.subplots(1, 2 if several else 1, sharey=True, squeeze=False)[0]
+    names = ("costs", "apart") if several else ("costs",)
+    least = 1.0 + min(0.2 * len(campaign.records), 6.0)
+    figure, panel = sheet(fig, (11.0 if several else 7.5, height), (names,), least=least)
+    axes = list(panel.values())
     _costs(campaign, axes[0])
     if several:
         _apart(campaign, axes[1])
-    _records(campaign, axes[0])
-    figure.suptitle(size_of(campaign), fontsize="large")
+    for ax in axes:
+        _records(campaign, ax)
+        if ax is not axes[0] and not is_narrow(fig, (11.0, height)):
+            ax.tick_params(labelleft=False)
+    caption(figure, size_of(campaign))
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:
         figure.legend(
             handles, labels, loc="outside lower center", ncols=3, fontsize="small", frameon=False
         )
+    return whole(figure)
+
+
+def _along(campaign: Campaign, fig: Figure | SubFigure | None) -> Figure:
+    """Draw the rms of one model over the records, in the order given."""
+    figure, axes = sheet(fig, (7.5, 3.6), (("costs",),), least=1.9)
+    ax, (model,) = axes["costs"], campaign.models
+    rms = [math.nan if one.error is not None else one.rms_percent for one in campaign]
+    places = np.arange(1.0, len(rms) + 1.0)
+    ax.plot(places, rms, **{**_style(campaign, model), "linestyle": "-", "linewidth": 0.8})
+    if campaign.failed:
+        lost = [place for place, one in zip(places, rms, strict=True) if math.isnan(one)]
+        ax.plot(lost, [0.0] * len(lost), "x", color="black", label="no model found", clip_on=False)
+    median = float(np.nanmedian(rms)) if np.isfinite(rms).any() else 0.0
+    ax.axhline(median, **LEVEL, label=f"median {median:.3g} %")
+    ax.set(xlabel="record, in the order given", ylabel="rms error [% of stroke]")
+    ax.set_ylim(bottom=0.0)
+    ax.locator_params(axis="x", integer=True)
+    legend_inside(ax)
+    caption(figure, f"{literal(model)}: {size_of(campaign)}")
     return whole(figure)
 
 
@@ -108,7 +141,6 @@ def _costs(campaign: Campaign, ax: Axes) -> None:
     else:
         # Room for the crosses at the edge.
         ax.set_xlim(0.0, 1.1 * high)
-        few_ticks(ax)
     if campaign.failed:
         ax.plot(
             [0.985] * len(campaign.failed),
@@ -158,10 +190,8 @@ def _records(campaign: Campaign, ax: Axes) -> None:
     count = len(records)
     ax.set_ylim(count + 0.5, 0.5)
     if count <= NAMED:
-        ax.set_yticks(range(1, count + 1), [literal(folded(title, LABEL)) for title in records])
+        names_beside(ax, range(1, count + 1), list(records))
     else:
         ax.set_ylabel("record, in the order given")
     for place in np.arange(1.5, count) if count <= NAMED else []:
         ax.axhline(place, **GUIDE)
-        if len(ax.figure.axes) > 1:
-            ax.figure.axes[1].axhline(place, **GUIDE)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,11 +12,14 @@ from ..._support.display.plot_style import (
     MEASURED,
     MODELS,
     QUIET,
-    few_ticks,
+    caption,
+    drawing,
     heading,
+    is_narrow,
     literal,
+    names_beside,
     panels,
-    thinned,
+    trace,
     whole,
 )
 from ..._support.units import best_length_unit, shown_unit
@@ -35,12 +37,9 @@ __all__ = ["plot_comparison"]
 
 FITTED: dict[str, Any] = {"color": "0.8", "edgecolor": "0.3", "hatch": "///", "label": "fitted"}
 JUDGED: dict[str, Any] = {"color": "0.35", "edgecolor": "0.2", "label": "not fitted"}
-# Letters of a name in a line beside its bars.
-LABEL = 20
-# Most names for which there is room to the right of the loop's lower end.
-NAMES_INSIDE = 6
 
 
+@drawing
 def plot_comparison(comparison: Comparison, fig: Figure | SubFigure | None = None) -> Figure:
     """Put loops, errors and bars on one sheet.
 
@@ -57,27 +56,26 @@ def plot_comparison(comparison: Comparison, fig: Figure | SubFigure | None = Non
         The figure drawn in: a loop and its errors, bars, and the error of each model.
     """
     rows = comparison.rows
-    figure = panels(fig, (11.0, max(7.4, 1.25 * len(rows) + 2.2)))
-    grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
-    # Many names are beside each other nowhere: they get a place of their own below the loop.
-    names = [0.25 + 0.045 * len(rows)] if len(rows) > NAMES_INSIDE else []
-    heights = [1.5, *names, 1.1, 0.6 + 0.16 * len(rows)]
+    size = (11.0, max(8.2, 0.9 * len(rows) + 3.0))
+    if is_narrow(fig, size):
+        figure = panels(fig, (11.0, 18.0 + 2.2 * len(rows)))
+        grid = figure.add_gridspec(2, 1, height_ratios=[18.0, 2.2 * len(rows)])
+    else:
+        figure = panels(fig, size)
+        grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
+    # The names have a place of their own below the loop.
+    heights = [1.5, 0.3 + 0.045 * len(rows), 1.1, 0.7 + 0.24 * len(rows)]
     left = grid[0].subgridspec(len(heights), 1, height_ratios=heights)
     right = grid[1].subgridspec(len(rows), 1)
     loop = figure.add_subplot(left[0])
     _loops(comparison, loop, figure.add_subplot(left[-2], sharex=loop))
-    if names:
-        below = figure.add_subplot(left[1])
-        below.set_axis_off()
-        named = loop.get_legend_handles_labels()
-        below.legend(*named, loc="center", frameon=False, fontsize="small", handlelength=4.0)
-    else:
-        low, high = loop.get_ylim()
-        loop.set_ylim(bottom=low - 0.07 * len(rows) * (high - low))
-        loop.legend(loc="lower right", frameon=False, fontsize="small")
+    below = figure.add_subplot(left[1])
+    below.set_axis_off()
+    named = loop.get_legend_handles_labels()
+    below.legend(*named, loc="center", frameon=False, fontsize="small", handlelength=4.0)
     _bars(comparison, figure.add_subplot(left[-1]))
     _errors(comparison, [figure.add_subplot(right[i]) for i in range(len(rows))])
-    figure.suptitle(_title(comparison), fontsize="large")
+    caption(figure, _title(comparison))
     return whole(figure)
 
 
@@ -110,7 +108,6 @@ def _loops(comparison: Comparison, loop: Axes, off: Axes) -> None:
     loop.set(ylabel=f"displacement [{unit}]")
     loop.tick_params(labelbottom=False)
     off.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"error [{small}]")
-    few_ticks(off)
     when = f"{data.t[part][0]:.4g} to {data.t[part][-1]:.4g} s"
     where = "" if comparison.carried else f" of {literal(data.source or 'the other record')}"
     heading(loop, f"Loop with the largest error\n({when}{where})")
@@ -128,7 +125,7 @@ def _cycle(u: Array, off: Array) -> slice:
 def _bars(comparison: Comparison, ax: Axes) -> None:
     """Draw the RMS of each model on both parts."""
     rows = comparison.rows
-    places = np.arange(len(rows))
+    places = np.arange(float(len(rows)))
     for shift, style, scores in (
         (-0.2, FITTED, [row.train for row in rows]),
         (0.2, JUDGED, [row.test for row in rows]),
@@ -136,15 +133,11 @@ def _bars(comparison: Comparison, ax: Axes) -> None:
         lengths = [score.rms_percent for score in scores]
         bars = ax.barh(places + shift, lengths, height=0.38, **style)
         ax.bar_label(bars, fmt=" %.3g", fontsize="small")
-    ax.set_yticks(places, [_in_lines(row.title) for row in rows])
+    names_beside(ax, places, [row.title for row in rows])
     ax.invert_yaxis()
-    ax.margins(x=0.15)
+    ax.margins(x=0.3)
     ax.set(xlabel="rms error [% of stroke]")
     ax.legend(fontsize="small", frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
-
-
-def _in_lines(title: str) -> str:
-    return "\n".join(literal(line) for line in wrap(title, LABEL))
 
 
 def _errors(comparison: Comparison, axes: list[Axes]) -> None:
@@ -162,14 +155,13 @@ def _errors(comparison: Comparison, axes: list[Axes]) -> None:
             (first.t, first.y - comparison.followed(row, "train")),
             (second.t + gap, second.y - comparison.followed(row, "test")),
         ):
-            shown = thinned(error)
-            ax.plot(t[shown], scale * error[shown], color=line["color"], linewidth=0.7)
+            trace(ax, t, scale * error, {"color": line["color"], "linewidth": 0.7})
         ax.axhline(0.0, **GUIDE)
         ax.axvline(split, **QUIET)
         ax.set_ylim(-reach, reach)
-        ax.margins(x=0.0)
-        ax.set_ylabel(f"error [{unit}]")
-        ax.set_title(_heading(row), fontsize="medium", loc="left")
+        if ax is axes[len(axes) // 2]:
+            ax.set_ylabel(f"error [{unit}]")
+        ax.set_title(_heading(row), fontsize="small", loc="left")
         ax.sharex(axes[0])
         ax.tick_params(labelbottom=ax is axes[-1])
     how = "" if comparison.carried else ", the other record after the first"

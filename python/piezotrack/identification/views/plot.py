@@ -13,18 +13,22 @@ from ..._support.arguments import expect, finite, positive
 from ..._support.display.plot_style import (
     BAND,
     ERROR,
-    GUIDE,
     MARKS,
     MEASURED,
     QUIET,
     SIMULATED,
     axes_or_new,
+    caption,
+    drawing,
     heading,
+    is_narrow,
     legend_inside,
     literal,
     panels,
     plain_log_ticks,
+    sheet,
     thinned,
+    trace,
     whole,
 )
 from ..._support.units import best_length_unit, shown_unit
@@ -36,7 +40,7 @@ from ..fitted.score import share_fitted
 from ..methods.particle_swarm import ParticleSwarm
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
@@ -62,6 +66,11 @@ __all__ = [
 ]
 
 
+# Samples of a cycle of a model that is shown without a record.
+SAMPLES = 500
+STYLES = {"measured": MEASURED, "simulated": SIMULATED}
+
+
 def _check(data: Dataset, run: Response) -> None:
     """Check a record and a response, which belong together."""
     expect("data", data, Dataset, "a Dataset")
@@ -70,6 +79,7 @@ def _check(data: Dataset, run: Response) -> None:
         raise ShapeError("run", f"{run.x.size} samples", f"{data.y.size}, as the record")
 
 
+@drawing
 def plot_loop(
     data: Dataset, run: Response, ax: Axes | None = None, *, title: str = "Hysteresis loop"
 ) -> Axes:
@@ -93,19 +103,26 @@ def plot_loop(
     """
     _check(data, run)
     (ax,) = axes_or_new(ax, 1)
-    unit, scale = best_length_unit(data.stroke)
-    drive, times = shown_unit(data.drive_unit)
-    for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
-        kept = thinned(y)
-        ax.plot(times * data.u[kept], scale * y[kept], **style)
-    ax.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
+    _loop(ax, data.u, {"measured": data.y, "simulated": run.x}, data.drive_unit)
     heading(ax, title)
-    # Beside the loop, which fills the other diagonal.
-    falls = float(np.dot(data.u - data.u.mean(), data.y - data.y.mean())) < 0.0
-    ax.legend(loc="upper right" if falls else "upper left", frameon=False, fontsize="small")
     return ax
 
 
+def _loop(ax: Axes, u: Array, signals: Mapping[str, Array], drive_unit: str) -> None:
+    """Draw signals, by their names, over the drive."""
+    unit, scale = best_length_unit(max(float(np.ptp(x)) for x in signals.values()))
+    drive, times = shown_unit(drive_unit)
+    for name, x in signals.items():
+        kept = thinned(x)
+        ax.plot(times * u[kept], scale * x[kept], **STYLES[name])
+    ax.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
+    # Beside the loop, which fills the other diagonal.
+    x = next(iter(signals.values()))
+    falls = float(np.dot(u - u.mean(), x - x.mean())) < 0.0
+    ax.legend(loc="upper right" if falls else "upper left", frameon=False, fontsize="small")
+
+
+@drawing
 def plot_time(
     data: Dataset,
     run: Response,
@@ -149,10 +166,8 @@ def plot_time(
         error[data.left_out] = np.nan
     small, fine = best_length_unit(float(np.abs(data.counted(error)).max()))
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
-        kept = thinned(y)
-        above.plot(data.t[kept], scale * y[kept], **style)
-    above.set(ylabel=f"displacement [{unit}]")
-    heading(above, title, 84)
+        trace(above, data.t, scale * y, style, ylabel=f"displacement [{unit}]")
+    heading(above, title)
     if fitted_until is not None:
         mark = {**QUIET, "label": "fitted before, predicted after"}
         fitted_until = finite("fitted_until", fitted_until, "s")
@@ -161,26 +176,30 @@ def plot_time(
     above.margins(x=0.0, y=0.05)
     legend_inside(above)
     t, error = data.at_readings(data.t), data.at_readings(error)
-    kept = thinned(error)
-    below.plot(t[kept], fine * error[kept], **{**ERROR, "linewidth": 0.8})
+    trace(
+        below,
+        t,
+        fine * error,
+        {**ERROR, "linewidth": 0.8},
+        zero=True,
+        xlabel="time [s]",
+        ylabel=f"error [{small}]",
+    )
     if half is not None:
         kept = thinned(half)
         width = fine * half[kept]
         below.fill_between(data.t[kept], -width, width, **BAND)
         legend_inside(below)
-    below.axhline(0.0, **GUIDE)
-    below.set(xlabel="time [s]", ylabel=f"error [{small}]")
     rms = float(np.sqrt(np.mean(error**2)))
     heading(
         below,
         f"error = measured - simulated: rms {fine * rms:.3g} {small} "
         f"({100 * rms / stroke:.3g} % of stroke)",
-        84,
     )
-    below.margins(x=0.0)
     return above, below
 
 
+@drawing
 def plot_convergence(
     fit: Identification, ax: Axes | None = None, *, title: str = "Convergence"
 ) -> Axes:
@@ -233,16 +252,14 @@ def plot_convergence(
         ax.set_yscale("log")
     ax.set(xlabel="iteration", ylabel="best cost, rms [um]")
     ax.margins(x=0.02)
-    heading(
-        ax,
-        f"{title}: {search.nit} iterations, {fit.nfev} simulations",
-    )
+    heading(ax, f"{title}: {search.nit} iterations, {fit.nfev} simulations")
     legend_inside(ax, ncols=2)
     if shown.any():
         plain_log_ticks(ax)
     return ax
 
 
+@drawing
 def plot_response(
     t: Array,
     u: Array,
@@ -251,8 +268,9 @@ def plot_response(
     *,
     title: str = "Simulated response",
     drive_unit: str = "V",
+    measured: Array | None = None,
 ) -> Figure:
-    """Draw a simulated displacement over time and over the drive.
+    """Draw a simulated displacement over time and over the drive, and the measured one.
 
     Parameters
     ----------
@@ -264,28 +282,33 @@ def plot_response(
         What ran.
     drive_unit : str, optional
         Unit of the drive, SI.
+    measured : ndarray, shape (n,), optional
+        Displacement in the log [m].
 
     Returns
     -------
     matplotlib.figure.Figure
         The figure drawn in.
     """
-    figure = panels(fig, (11.0, 4.2))
-    left, right = figure.subplots(1, 2)
-    unit, scale = best_length_unit(float(np.ptp(x)))
-    kept = thinned(x)
-    left.plot(t[kept], scale * x[kept], **SIMULATED)
-    left.set(xlabel="time [s]", ylabel=f"displacement [{unit}]")
-    heading(left, "Displacement over time")
-    left.margins(x=0.0)
-    drive, times = shown_unit(drive_unit)
-    right.plot(times * u[kept], scale * x[kept], **SIMULATED)
-    right.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
-    heading(right, "Hysteresis loop")
-    figure.suptitle(literal(title), fontsize="large")
+    figure, axes = sheet(fig, (11.0, 4.2), (("time", "loop"),))
+    signals = {"simulated": x} if measured is None else {"measured": measured, "simulated": x}
+    unit, scale = best_length_unit(max(float(np.ptp(one)) for one in signals.values()))
+    for name, signal in signals.items():
+        trace(
+            axes["time"],
+            t,
+            scale * signal,
+            STYLES[name],
+            xlabel="time [s]",
+            ylabel=f"displacement [{unit}]",
+        )
+    legend_inside(axes["time"])
+    _loop(axes["loop"], u, signals, drive_unit)
+    caption(figure, literal(title))
     return whole(figure)
 
 
+@drawing
 def plot_model(
     model: IdentifiedModel, data: Dataset | None = None, fig: Figure | SubFigure | None = None
 ) -> Figure:
@@ -313,21 +336,24 @@ def plot_model(
     fit = model if isinstance(model, Identification) else None
     if fit is not None and data is None and len(fit.records) > 1:
         return _of_records(fit, fig)
+    if fit is None and data is None:
+        return _without_record(model, fig)
     record, run = _shown(model, data)
     searched = fit is not None and fit.model.info.searched
-    figure = panels(fig, (11.0, 6.6 if searched else 5.6))
-    grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
-    plot_loop(record, run, figure.add_subplot(grid[0 if searched else slice(None), 0]))
+    rows = (("loop", "time"), ("convergence" if searched else "loop", "error"))
+    figure, axes = sheet(fig, (11.0, 6.6 if searched else 5.6), rows, widths=(1.0, 1.35), down=True)
+    plot_loop(record, run, axes["loop"])
     if fit is not None and searched:
-        plot_convergence(fit, figure.add_subplot(grid[1, 0]))
-    above = figure.add_subplot(grid[0, 1])
-    below = figure.add_subplot(grid[1, 1], sharex=above)
-    plot_time(record, run, (above, below), stroke=model.stroke, half=band_of(model, record))
+        plot_convergence(fit, axes["convergence"])
+    both = axes["time"], axes["error"]
+    both[1].sharex(both[0])
+    plot_time(record, run, both, stroke=model.stroke, half=band_of(model, record))
     title = what_was_shown(model, record, run)
-    figure.suptitle(what_was_fitted(fit) if fit and data is None else title, fontsize="large")
+    caption(figure, what_was_fitted(fit) if fit and data is None else title)
     return whole(figure)
 
 
+@drawing
 def plot_model_loop(
     model: IdentifiedModel, data: Dataset | None = None, ax: Axes | None = None
 ) -> Axes:
@@ -335,12 +361,30 @@ def plot_model_loop(
     return plot_loop(*_shown(model, data), ax)
 
 
+@drawing
 def plot_model_time(
     model: IdentifiedModel, data: Dataset | None = None, axes: Sequence[Axes] | None = None
 ) -> tuple[Axes, Axes]:
     """Draw displacement and error of a model on a record, as `plot_time`."""
     record, run = _shown(model, data)
     return plot_time(record, run, axes, stroke=model.stroke, half=band_of(model, record))
+
+
+def _without_record(model: IdentifiedModel, fig: Figure | SubFigure | None) -> Figure:
+    """Draw the loops of a model over the range of the drive that was fitted, and inner ones."""
+    if model.drive_range is None:
+        raise ParameterError("data", "None", "a record, as the file of the model has no range")
+    low, high = model.drive_range
+    t = np.arange(4.0 * SAMPLES + 1.0) / SAMPLES
+    # A cycle of the whole range and then half of it, about its middle.
+    size = np.where(t < 2.0, 1.0, 0.5)
+    u = 0.5 * (low + high) + 0.5 * (high - low) * size * np.sin(2.0 * np.pi * t)
+    x = model.displacement(u, 1.0 / SAMPLES, initial=model.model.equilibrium(float(u[0])))
+    first = SAMPLES
+    title = f"{model.model.info.title}: loops at 1 Hz over the range fitted, and half of it"
+    return plot_response(
+        *(t[first:], u[first:], x[first:]), fig, title=title, drive_unit=model.drive_unit
+    )
 
 
 def band_of(model: IdentifiedModel, data: Dataset) -> Array | None:
@@ -375,21 +419,25 @@ def _shown(model: IdentifiedModel, data: Dataset | None) -> tuple[Dataset, Respo
 
 def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
     """Draw loop, displacement and error of each record, and the convergence below."""
-    count = len(fit.records)
-    figure = panels(fig, (11.0, 4.6 * count + 3.0))
-    parts = figure.subfigures(count + 1, 1, height_ratios=[4.6] * count + [3.0], squeeze=False)
-    for record, part in zip(fit.records, parts[:count, 0], strict=True):
+    # Below each other three panels of a record take more than beside each other.
+    high = 21.0 if is_narrow(fig, (11.0, 4.6)) else 4.6
+    heights = [high] * len(fit.records) + ([3.0 * high / 9.0] if fit.model.info.searched else [])
+    figure = panels(fig, (11.0, sum(heights)))
+    parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    for record, part in zip(fit.records, parts, strict=False):
         if record.data is None:
             continue
         run = fit.simulate(record.data, offset=record.offset)
-        grid = part.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
-        plot_loop(record.data, run, part.add_subplot(grid[:, 0]))
-        above = part.add_subplot(grid[0, 1])
-        below = part.add_subplot(grid[1, 1], sharex=above)
+        rows = (("loop", "time"), ("loop", "error"))
+        _, axes = sheet(part, (11.0, 4.6), rows, widths=(1.0, 1.35))
+        plot_loop(record.data, run, axes["loop"])
+        both = axes["time"], axes["error"]
+        both[1].sharex(both[0])
         half = band_of(fit, record.data)
-        plot_time(record.data, run, (above, below), stroke=record.stroke, half=half)
-        part.suptitle(what_was_fitted(fit, record), fontsize="large")
-    plot_convergence(fit, parts[count, 0].subplots())
+        plot_time(record.data, run, both, stroke=record.stroke, half=half)
+        caption(part, what_was_fitted(fit, record))
+    if fit.model.info.searched:
+        plot_convergence(fit, parts[-1].subplots())
     return whole(figure)
 
 

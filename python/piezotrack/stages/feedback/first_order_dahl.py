@@ -46,7 +46,7 @@ class FirstOrderDahlStage(Stage):
     -----
     The force stays within the Coulomb force and dissipates; under a periodic drive its loops
     close after a few cycles. The second-order form of Xu and Li 2010, `DahlStage`, does neither:
-    docs/feedback.md shows the two over a hundred cycles.
+    docs/models.md shows the two over a hundred cycles.
 
     Examples
     --------

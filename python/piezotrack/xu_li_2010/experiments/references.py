@@ -15,7 +15,8 @@ __all__ = ["RULES", "SHRUNK", "fast", "shrunk", "slow"]
 SHRUNK = (6.0, 28.0)
 RANGE = 110e-6
 
-# The rule of Fig. 13 is the first one written down; docs/paper.md has the other.
+# The rule of Fig. 13 is the first one written down; docs/decisions/11-calibrated-stage.md has
+# the other.
 RULES = {
     "13": "0.2 Hz as in Fig. 12; the limits times the published static gain, 9.4 to 44 um. The "
     "first rule written down, restored after the calibration: with the rule in between, 8 to "

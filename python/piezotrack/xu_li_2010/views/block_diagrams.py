@@ -189,7 +189,7 @@ def draw() -> Figure:
 def _draw(diagram: Diagram, ax: Axes) -> None:
     from matplotlib.patches import Circle, Rectangle
 
-    heading(ax, diagram.title, width=90)
+    heading(ax, diagram.title)
     rows = [y for path in diagram.paths for _, y in path]
     ax.set(xlim=(0.0, WIDTH), ylim=(min(rows) - 0.8, max(rows) + 0.8), aspect="equal")
     ax.axis("off")

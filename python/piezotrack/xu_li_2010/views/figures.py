@@ -11,11 +11,13 @@ from ..._support.display.plot_style import (
     MARKS,
     MEASURED,
     MODELS,
+    caption,
+    drawing,
     heading,
     legend_inside,
+    panels,
     whole,
 )
-from ..._support.display.plot_style import panels as sheet
 from ..experiments.references import RULES
 from . import block_diagrams
 
@@ -128,33 +130,38 @@ THIRTEEN = {
 FOURTEEN = {"without": "feedforward and PID", "with": "with repetitive control"}
 
 
+@drawing
 def _grid(runs: Runs, names: dict[str, str], columns: tuple[str, ...]) -> Figure:
     """Draw each run in a row."""
-    figure = sheet(None, (12.0, 3.3 * len(names)))
+    figure = panels(None, (12.0, 3.3 * len(names)))
     rows = figure.subfigures(len(names), 1, squeeze=False)[:, 0]
     for (key, title), row in zip(names.items(), rows, strict=True):
         run = runs[key]
-        row.suptitle(f"{title}: {run.metrics}", fontsize="medium")
+        caption(row, f"{title}: {run.metrics}", "medium")
         for panel, ax in zip(columns, row.subplots(1, len(columns)), strict=True):
             getattr(run, f"plot_{panel}")(ax=ax)
             if panel == "error":
                 # Scaled to the settled error; the smooth start is cropped.
                 reach = 1.25e6 * run.metrics.max_error
                 ax.set_ylim(-reach, reach)
+                for inset in ax.child_axes:
+                    inset.remove()
                 legend_inside(ax, ncols=2)
     return whole(figure)
 
 
+@drawing
 def _convergence(fit: Identification) -> Figure:
     """Draw the convergence of the swarm."""
-    figure = sheet(None, (11.0, 4.2))
+    figure = panels(None, (11.0, 4.2))
     fit.plot_convergence(ax=figure.add_subplot())
     return whole(figure)
 
 
+@drawing
 def _drives(drives: Drives) -> Figure:
     """Draw the drives over the reference and, less the line, over time."""
-    figure = sheet(None, (11.0, 4.6))
+    figure = panels(None, (11.0, 4.6))
     left, right = figure.subplots(1, 2)
     # Two periods of 1 Hz.
     part = drives.t < drives.t[0] + 2.0
@@ -172,6 +179,7 @@ def _drives(drives: Drives) -> Figure:
     return whole(figure)
 
 
+@drawing
 def plot_reproduction(reproduction: Reproduction, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw obtained over published of every number, with quartiles, in the order of the paper.
 
@@ -188,7 +196,7 @@ def plot_reproduction(reproduction: Reproduction, fig: Figure | SubFigure | None
         The figure drawn in.
     """
     rows = reproduction.obtained
-    figure = sheet(fig, (11.0, 5.0))
+    figure = panels(fig, (11.0, 5.0))
     ax = figure.subplots()
     ratios = np.array([row.ratio for row in rows])
     quartiles = np.array([row.quartiles for row in rows]).T

@@ -1,4 +1,4 @@
-"""The report as a table of text, for the terminal and the PDF."""
+"""The report as a table of text, for the terminal."""
 
 from __future__ import annotations
 

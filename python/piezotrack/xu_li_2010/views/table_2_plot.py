@@ -11,9 +11,11 @@ from ..._support.display.plot_style import (
     ERROR,
     GUIDE,
     MEASURED,
+    caption,
+    drawing,
     heading,
     legend_inside,
-    panels,
+    sheet,
     whole,
 )
 
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_table_2"]
 
 
+@drawing
 def plot_table_2(table: Table2, fig: Figure | SubFigure | None = None) -> Figure:
     """Plot the circles at 0.1 Hz, their errors over an angle, and published and obtained values.
 
@@ -44,21 +47,22 @@ def plot_table_2(table: Table2, fig: Figure | SubFigure | None = None) -> Figure
     matplotlib.figure.Figure
         The figure drawn in.
     """
-    figure = panels(fig, (11.0, 8.4))
-    grid = figure.add_gridspec(2, 6, height_ratios=[1.5, 1.0])
-    circles = figure.add_subplot(grid[0, :3])
+    rows = (3 * ("circles",) + 3 * ("angle",), [one for one in ("max", "mean", "SD") for _ in "12"])
+    figure, axes = sheet(fig, (11.0, 8.4), rows, heights=(1.5, 1.0))
+    circles = axes["circles"]
     slow = [run for case, run in table.cases if case.frequency == 0.1]
     for run in slow:
         run.plot_magnified(ax=circles, factor=5.0)
     heading(circles, "0.1 Hz, contour error \N{MULTIPLICATION SIGN} 5")
     # One name for the lines of all circles, and a square as without their legends.
+    for line in circles.lines[2:]:
+        line.set_label("_")
     circles.set_ylim(top=circles.get_ylim()[0] + float(np.ptp(circles.get_xlim())))
-    handles, names = circles.get_legend_handles_labels()
-    circles.legend(handles[:2], names[:2], loc="upper left", frameon=False, fontsize="small")
-    _over_angle(slow, figure.add_subplot(grid[0, 3:]))
-    for column, name in enumerate(("max", "mean", "SD")):
-        _bars(table, name, figure.add_subplot(grid[1, 2 * column : 2 * column + 2]))
-    figure.suptitle("Circles of Table 2 of Xu and Li 2010", fontsize="large")
+    legend_inside(circles, ncols=2)
+    _over_angle(slow, axes["angle"])
+    for name in ("max", "mean", "SD"):
+        _bars(table, name, axes[name])
+    caption(figure, "Circles of Table 2 of Xu and Li 2010")
     return whole(figure)
 
 

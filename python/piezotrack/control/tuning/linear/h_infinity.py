@@ -114,8 +114,8 @@ def mixed_sensitivity(
     largest_sensitivity : float, optional
         M, the largest amplification of a disturbance, above 1.
     effort : float, optional
-        m, the largest gain from the reference, or from noise, to the voltage, in parts of 1/|P(0)|,
-        below twice the bandwidth; a tenth of that far above.
+        m, the largest gain from the reference, or from noise, to the voltage, in parts of
+        ``1 / |P(0)|``, below twice the bandwidth; a tenth of that far above.
     roll_off : float, optional
         Frequency [Hz] from which the complementary sensitivity falls; default no W3.
     delay : float, optional

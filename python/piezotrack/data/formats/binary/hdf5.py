@@ -38,7 +38,8 @@ def _opens(source: Source) -> ChannelTable:
             channels += _of_dataset(source, h5py, dataset, group, name, unit)
             channels += _constants(h5py, dataset.attrs, group)
         channels += _constants(h5py, file.attrs, "")
-    return ChannelTable(source, channels)
+    notes = [f"{source.name} is HDF5 without MATLAB's header: it is read as HDF5"]
+    return ChannelTable(source, channels, notes=notes if source.ending == ".mat" else [])
 
 
 def open_matlab(source: Source) -> ChannelTable:

@@ -22,6 +22,7 @@ from ...text_fields import (
     number_of,
     split_fields,
 )
+from ..kinds import kind_of
 from ..table import MOST_COLUMNS, Format, Table
 from .dates import instant_of, is_ambiguous
 
@@ -42,8 +43,8 @@ __all__ = ["FORMAT", "Layout", "TextTable", "lines_of"]
 
 # A line beyond this is none of a log.
 MOST_LETTERS = 1_000_000
-# Formats that are opened as text by mistake.
-SPREADSHEETS = (".xls", ".xlsx", ".ods")
+# Lines above titles at most.
+MOST_ABOVE = 200
 CUT_OFF = "; the log may have been cut off in this last line"
 # Samples before a last one without its line end that it is compared with: at least, and at most.
 LEAST_BEFORE, MOST_BEFORE = 10, 1000
@@ -70,9 +71,11 @@ def lines_of(source: Source) -> list[str]:
     DataError
         It is no text, or has a line too long for a log.
     """
-    if source.ending in SPREADSHEETS:
-        raise source.error(f"is a spreadsheet ({source.ending}): expected it exported as CSV")
+    if (kind := kind_of(source.head)) is not None:
+        raise source.error(kind)
     lines = _decode(source, source.content()).split("\n")
+    # They stay, as blank ones, so that messages name the lines that an editor shows.
+    lines[: source.skip] = [""] * min(source.skip, len(lines))
     longest = max(map(len, lines))
     if longest > MOST_LETTERS:
         line = next(k for k, text in enumerate(lines) if len(text) == longest)
@@ -232,6 +235,21 @@ class TextTable(Table):
     def column(self, column: Column) -> Array:
         """Read one column; what is not a number is NaN."""
         return self.all_columns()[:, column.index]
+
+    def above(self) -> int | None:
+        """Return the number of lines above titles further down, with samples right below them."""
+        lines = self.layout.lines[: MOST_ABOVE + 1]
+        for k in range(self.layout.first, len(lines) - 1):
+            delimiter = delimiter_of(lines[k])
+            titles, below = (split_fields(line, delimiter) for line in lines[k : k + 2])
+            if 1 < len(titles) == len(below) and are_titles(titles) and not are_titles(below):
+                return k
+        return None
+
+    def is_empty(self, column: Column) -> bool:
+        """Whether there is no reading in any line."""
+        fields = (self._fields(line) for _, line in self.layout.rows())
+        return all(is_missing(row[column.index]) for row in fields if column.index < len(row))
 
     def all_columns(self) -> Array:
         """Read all columns; what is not a number is NaN."""

@@ -13,10 +13,11 @@ from ...._support.display.plot_style import (
     LEVEL,
     MARKS,
     SIMULATED,
-    few_ticks,
+    caption,
+    drawing,
     heading,
     literal,
-    panels,
+    sheet,
     whole,
 )
 
@@ -33,6 +34,7 @@ ACROSS, HIGHEST = 4, 3.0
 BINS, POINTS = 24, 400
 
 
+@drawing
 def plot_confidence(confidence: Confidence, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw the rise of the cost along each parameter, or the distribution of its refits.
 
@@ -50,12 +52,11 @@ def plot_confidence(confidence: Confidence, fig: Figure | SubFigure | None = Non
     """
     each = confidence.parameters
     across = min(ACROSS, max(len(each), 1))
-    down = -(-len(each) // across)
-    figure = panels(fig, (3.1 * across, 0.6 + 2.6 * down))
-    axes = figure.subplots(down, across, squeeze=False)
-    for ax in axes.flat[len(each) :]:
-        ax.axis("off")
-    for i, (ax, (name, one)) in enumerate(zip(axes.flat, each.items(), strict=False)):
+    names = [*each, *("." for _ in range(-len(each) % across))]
+    rows = [names[i : i + across] for i in range(0, len(names), across)]
+    figure, axes = sheet(fig, (3.1 * across, 0.6 + 2.6 * len(rows)), rows)
+    for name, one in each.items():
+        ax = axes[name]
         _interval(ax, one)
         if confidence.draws:
             ax.hist(one.values, BINS, color=GREY)
@@ -63,13 +64,12 @@ def plot_confidence(confidence: Confidence, fig: Figure | SubFigure | None = Non
         else:
             _profile(ax, one)
             label = "rise of the cost / threshold"
-        if i % across == 0:
+        if name in [row[0] for row in rows]:
             ax.set_ylabel(label)
         unit = f" [{literal(one.unit)}]" if one.unit else ""
         ax.set_xlabel(f"{name}{unit}")
-        heading(ax, one.shape or "", 40)
-        few_ticks(ax)
-    figure.suptitle(f"Intervals of {100.0 * confidence.level:g} %", fontsize="large")
+        heading(ax, one.shape or "")
+    caption(figure, f"Intervals of {100.0 * confidence.level:g} %")
     return whole(figure)
 
 

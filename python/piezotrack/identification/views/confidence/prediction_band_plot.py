@@ -17,10 +17,11 @@ from ...._support.display.plot_style import (
     ORANGE,
     PURPLE,
     SIMULATED,
+    drawing,
     heading,
     legend_inside,
     literal,
-    panels,
+    sheet,
     thinned,
     whole,
 )
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_band"]
 
 
+@drawing
 def plot_band(band: PredictionBand, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw a prediction with its band.
 
@@ -51,12 +53,12 @@ def plot_band(band: PredictionBand, fig: Figure | SubFigure | None = None) -> Fi
         The figure drawn in, with the loop, the displacement, and the errors with the parts of the
         band.
     """
-    figure = panels(fig, (11.0, 5.6))
-    grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.35])
-    _loop(band, figure.add_subplot(grid[:, 0]))
-    above = figure.add_subplot(grid[0, 1])
-    _time(band, above)
-    _parts(band, figure.add_subplot(grid[1, 1], sharex=above))
+    rows = (("loop", "time"), ("loop", "parts"))
+    figure, axes = sheet(fig, (11.0, 5.6), rows, widths=(1.0, 1.35))
+    _loop(band, axes["loop"])
+    _time(band, axes["time"])
+    axes["parts"].sharex(axes["time"])
+    _parts(band, axes["parts"])
     return whole(figure)
 
 

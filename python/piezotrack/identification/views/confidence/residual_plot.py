@@ -13,13 +13,14 @@ from ...._support.display.plot_style import (
     LEVEL,
     MARKS,
     RECORDED,
-    few_ticks,
+    caption,
+    drawing,
     heading,
     legend_inside,
     literal,
-    panels,
     plain_log_ticks,
-    thinned,
+    sheet,
+    trace,
     whole,
 )
 from ...._support.units import best_length_unit, drive_word, shown_unit
@@ -42,6 +43,7 @@ __all__ = ["plot_fit_residual", "plot_residual"]
 MOST_POINTS, WINDOWS, LAGS = 4000, 8, 60
 
 
+@drawing
 def plot_fit_residual(
     fit: Identification, record: int = 0, fig: Figure | SubFigure | None = None
 ) -> Figure:
@@ -49,6 +51,7 @@ def plot_fit_residual(
     return plot_residual(residual_of(fit, record), fig)
 
 
+@drawing
 def plot_residual(residual: Residual, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw a residual against time, drive, rate and amplitude, its spectrum and autocorrelation.
 
@@ -64,16 +67,16 @@ def plot_residual(residual: Residual, fig: Figure | SubFigure | None = None) -> 
     matplotlib.figure.Figure
         The figure drawn in.
     """
-    figure = panels(fig, (12.0, 7.2))
-    axes = figure.subplots(2, 3)
+    rows = (("time", "drive", "rate"), ("amplitude", "spectrum", "correlation"))
+    figure, axes = sheet(fig, (12.0, 7.2), rows)
     data, kept = residual.data, residual.kept
     values = residual.values[kept]
     unit, scale = best_length_unit(float(np.abs(values).max()))
-    _of_time(axes[0, 0], data.t[kept], values, unit, scale)
+    _of_time(axes["time"], data.t[kept], values, unit, scale)
     drive, times = shown_unit(data.drive_unit)
     word = drive_word(data.drive_unit)
     _, *profiles = residual.profiles
-    places = (axes[0, 1], axes[0, 2], axes[1, 0])
+    places = (axes["drive"], axes["rate"], axes["amplitude"])
     clouds = (data.u, residual.rate, residual.amplitude)
     labels = (
         f"{word} [{literal(drive)}]",
@@ -83,20 +86,24 @@ def plot_residual(residual: Residual, fig: Figure | SubFigure | None = None) -> 
     for ax, profile, cloud, label in zip(places, profiles, clouds, labels, strict=True):
         _cloud(ax, profile, times * cloud[kept], values, times, scale)
         ax.set(xlabel=label, ylabel=f"residual [{unit}]")
-    _spectrum(axes[1, 1], residual, unit, scale)
-    _autocorrelation(axes[1, 2], residual)
+    _spectrum(axes["spectrum"], residual, unit, scale)
+    _autocorrelation(axes["correlation"], residual)
     title = literal(f"Residual, {scale * residual.rms:.3g} {unit} rms: {verdict(residual)}")
-    figure.suptitle(title, fontsize="large")
+    caption(figure, title)
     return whole(figure)
 
 
 def _of_time(ax: Axes, t: Array, values: Array, unit: str, scale: float) -> None:
-    shown = thinned(values)
-    ax.plot(t[shown], scale * values[shown], **{**ERROR, "linewidth": 0.7})
-    ax.axhline(0.0, **GUIDE)
-    ax.set(xlabel="time [s]", ylabel=f"residual [{unit}]")
-    ax.margins(x=0.0)
-    heading(ax, "Over time", 40)
+    trace(
+        ax,
+        t,
+        scale * values,
+        {**ERROR, "linewidth": 0.7},
+        zero=True,
+        xlabel="time [s]",
+        ylabel=f"residual [{unit}]",
+    )
+    heading(ax, "Over time")
 
 
 def _cloud(
@@ -118,8 +125,7 @@ def _cloud(
     ax.plot(centres, scale * profile.rms, **line, label="rms")
     ax.plot(centres, -scale * profile.rms, **line)
     ax.axhline(0.0, **GUIDE)
-    heading(ax, f"Against {profile.quantity}", 40)
-    few_ticks(ax)
+    heading(ax, f"Against {profile.quantity}")
     legend_inside(ax)
 
 
@@ -140,7 +146,7 @@ def _spectrum(ax: Axes, residual: Residual, unit: str, scale: float) -> None:
     level = scale * residual.noise * float(np.sqrt(2.0 * dt))
     ax.axhline(level, **LEVEL, label="noise from sample to sample")
     ax.set(xlabel="frequency [Hz]", ylabel=f"density [{unit}/\N{SQUARE ROOT}Hz]")
-    heading(ax, "Spectrum", 40)
+    heading(ax, "Spectrum")
     legend_inside(ax, ncols=1)
     plain_log_ticks(ax)
 
@@ -157,5 +163,5 @@ def _autocorrelation(ax: Axes, residual: Residual) -> None:
     ax.set(xlabel="lag [ms]", ylabel="autocorrelation")
     ax.set_ylim(min(-0.3, 1.1 * float(r.min())), 1.1)
     white = "white" if residual.is_white else "not white"
-    heading(ax, f"Autocorrelation: Q = {residual.portmanteau:.3g}, {white}", 44)
+    heading(ax, f"Autocorrelation: Q = {residual.portmanteau:.3g}, {white}")
     legend_inside(ax)

@@ -11,9 +11,12 @@ from ...._support.display.plot_style import (
     GREY,
     MODELS,
     RECORDED,
+    drawing,
     heading,
-    panels,
-    thinned,
+    legend_inside,
+    names_beside,
+    sheet,
+    trace,
     whole,
 )
 from ...._support.units import drive_word, length_text, shown_unit
@@ -26,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_suggested"]
 
 
+@drawing
 def plot_suggested(drive: SuggestedDrive, fig: Figure | SubFigure | None = None) -> Figure:
     """Plot a suggested drive, and the expected deviation of each parameter beside those of others.
 
@@ -42,13 +46,21 @@ def plot_suggested(drive: SuggestedDrive, fig: Figure | SubFigure | None = None)
         The figure drawn in.
     """
     names = list(drive.parameters)
-    figure = panels(fig, (11.0, max(4.4, 1.4 + 0.28 * len(names))))
-    left, right = figure.subplots(1, 2, gridspec_kw={"width_ratios": (1.5, 1.0)})
+    size = (11.0, max(4.4, 1.4 + 0.28 * len(names)))
+    figure, axes = sheet(
+        fig, size, (("drive", "deviations"),), widths=(1.5, 1.0), least=1.0 + 0.14 * len(names)
+    )
+    left, right = axes["drive"], axes["deviations"]
     unit, scale = shown_unit(drive.drive_unit)
-    shown = thinned(drive.u)
-    left.plot(drive.dt * shown, scale * drive.u[shown], **{**RECORDED, "linewidth": 0.8})
-    left.set(xlabel="time [s]", ylabel=f"{drive_word(drive.drive_unit)} [{unit}]")
-    left.margins(x=0)
+    t, line = drive.dt * np.arange(float(drive.u.size)), {**RECORDED, "linewidth": 0.8}
+    trace(
+        left,
+        t,
+        scale * drive.u,
+        line,
+        xlabel="time [s]",
+        ylabel=f"{drive_word(drive.drive_unit)} [{unit}]",
+    )
     heading(left, "Suggested drive")
     each = list(drive.parameters.values())
     series: list[tuple[str, str, str, list[float | None]]] = [
@@ -56,18 +68,16 @@ def plot_suggested(drive: SuggestedDrive, fig: Figure | SubFigure | None = None)
         ("plain sine", "s", MODELS[1]["color"], [one.of_sine for one in each]),
         ("record fitted", "D", "0.4", [one.of_record for one in each]),
     ]
-    rows, sizes = np.arange(len(names)), np.array([abs(one.value) for one in each])
+    rows, sizes = np.arange(float(len(names))), np.array([abs(one.value) for one in each])
     for label, marker, colour, deviations in series:
         known = np.array([math.nan if one is None else one for one in deviations])
         shares = np.where(np.isfinite(known), 100.0 * known / sizes, math.nan)
         if np.isfinite(shares).any():
             right.plot(shares, rows, marker, color=colour, label=label, markersize=6, alpha=0.9)
     right.set(xscale="log", xlabel="standard deviation [% of the value]")
-    right.set_yticks(rows, names)
+    names_beside(right, rows, names)
     right.invert_yaxis()
     right.grid(axis="y", color=GREY, linewidth=0.4)
-    right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False)
-    right.set_title(
-        f"Expected under a noise of {length_text(drive.noise, 3)} rms", fontsize="medium", pad=26
-    )
+    legend_inside(right, ncols=3)
+    heading(right, f"Expected under a noise of {length_text(drive.noise, 3)} rms")
     return whole(figure)

@@ -9,11 +9,13 @@ import numpy as np
 from ...._support.display.plot_style import (
     RECORDED,
     SIMULATED,
+    drawing,
     heading,
     legend_inside,
     literal,
-    panels,
     plain_log_ticks,
+    sheet,
+    trace,
     whole,
 )
 from ...._support.units import best_length_unit
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_noise"]
 
 
+@drawing
 def plot_noise(noise: Noise, fig: Figure | SubFigure | None = None) -> Figure:
     """Plot a record at rest: the beginning of it with its steps, and its spectrum.
 
@@ -41,20 +44,21 @@ def plot_noise(noise: Noise, fig: Figure | SubFigure | None = None) -> Figure:
     matplotlib.figure.Figure
         The figure drawn in.
     """
-    figure = panels(fig, (11.0, 4.4))
-    left, right = figure.subplots(1, 2)
+    figure, axes = sheet(fig, (11.0, 4.4), (("rest", "spectrum"),))
+    left, right = axes["rest"], axes["spectrum"]
     data = noise.data
     unit, scale = best_length_unit(noise.spread.peak_to_peak)
     # Long enough for the trend, short enough to resolve the steps.
     shown = slice(0, min(len(data), 400))
-    time = data.t[shown] - data.t[0]
-    left.step(1e3 * time, scale * (data.y[shown] - data.y[shown].mean()), where="post", **RECORDED)
-    left.set(xlabel="time [ms]", ylabel=f"displacement from the mean [{unit}]")
+    ms, y = 1e3 * (data.t[shown] - data.t[0]), scale * (data.y[shown] - data.y[shown].mean())
+    few = f"time [ms], of {data.duration:.3g} s" if len(data) > ms.size else "time [ms]"
+    trace(
+        left, ms, y, RECORDED, steps=True, xlabel=few, ylabel=f"displacement from the mean [{unit}]"
+    )
     resolution = noise.resolution
     steps = f", steps of {scale * resolution:.4g} {unit}" if resolution else ""
     source = f" in {literal(data.source)}" if data.source else ""
     heading(left, f"Sensor at rest{source}: {scale * noise.rms:.4g} {unit} rms{steps}")
-    left.margins(x=0)
     f, density = noise.spectrum()
     right.loglog(f, 1e9 * density, **{**RECORDED, "color": "0.6"})
     colour = "white" if np.isinf(noise.bandwidth) else f"low-pass {noise.bandwidth:.4g} Hz"

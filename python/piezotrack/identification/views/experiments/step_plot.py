@@ -12,9 +12,10 @@ from ...._support.display.plot_style import (
     MARKS,
     RECORDED,
     axes_or_new,
+    drawing,
     heading,
     literal,
-    panels,
+    sheet,
     whole,
 )
 from ...._support.units import best_length_unit, drive_text, shown_unit
@@ -34,6 +35,7 @@ SHOWN, MOST_POINTS = 8.0, 20000
 MARGIN = 0.06
 
 
+@drawing
 def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
     """Draw the displacement after the step, with the peaks and the level it ends at.
 
@@ -91,6 +93,7 @@ def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
     return ax
 
 
+@drawing
 def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
     """Draw the gain over the frequency, with the resonance and the static gain.
 
@@ -156,6 +159,7 @@ def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
     return ax
 
 
+@drawing
 def plot_step_result(step: StepResult, fig: Figure | SubFigure | None = None) -> Figure:
     """Put step and spectrum on one sheet.
 
@@ -177,10 +181,9 @@ def plot_step_result(step: StepResult, fig: Figure | SubFigure | None = None) ->
         The readings were entered by hand.
     """
     _trace(step)
-    figure = panels(fig, (11.0, 4.4))
-    left, right = figure.subplots(1, 2)
-    plot_step(step, left)
-    plot_spectrum(step, right)
+    figure, axes = sheet(fig, (11.0, 4.4), (("step", "spectrum"),))
+    plot_step(step, axes["step"])
+    plot_spectrum(step, axes["spectrum"])
     return whole(figure)
 
 

@@ -5,8 +5,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ...._support.display.plot_style import BLUE, GUIDE, RED, axes_or_new, heading, literal, whole
-from ...._support.display.plot_style import panels as panels_of
+from ...._support.display.plot_style import (
+    BLUE,
+    GUIDE,
+    RED,
+    drawing,
+    heading,
+    literal,
+    names_beside,
+    sheet,
+    whole,
+)
 from ...._support.units import length_text
 
 if TYPE_CHECKING:
@@ -69,6 +78,7 @@ def _row(change: Change) -> str:
     return f"{head}  {times}{scale * change.value:{form}}{unit}  ({low} to {high}){reason}"
 
 
+@drawing
 def plot_health(health: Health, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw each change with its interval, in half widths of the interval.
 
@@ -84,8 +94,8 @@ def plot_health(health: Health, fig: Figure | SubFigure | None = None) -> Figure
     matplotlib.figure.Figure
         The figure drawn in.
     """
-    figure = panels_of(fig, (7.5, 4.0))
-    (ax,) = axes_or_new(figure.subplots(), 1)
+    figure, axes = sheet(fig, (7.5, 4.0), (("changes",),), least=2.2)
+    ax = axes["changes"]
     for i, change in enumerate(health.changes):
         if change.value is None or change.interval is None:
             ax.text(0.0, i, "not judged", ha="center", va="center", color="0.4")
@@ -97,13 +107,13 @@ def plot_health(health: Health, fig: Figure | SubFigure | None = None) -> Figure
         colour = RED if change.verdict == "changed" else BLUE
         ax.plot([low, high], [i, i], color=colour, linewidth=3.0, solid_capstyle="butt")
         ax.plot(middle, i, "o", color=colour)
-        ax.annotate(_figure(change), (high, i), xytext=(6, 0), textcoords="offset points",
-                    va="center", fontsize=8)  # fmt: skip
+        ax.text(1.02, i, _figure(change), transform=ax.get_yaxis_transform(), va="center",
+                fontsize="small")  # fmt: skip
     ax.axvline(0.0, **GUIDE)
-    ax.set_xscale("symlog", linthresh=3.0)
-    ax.set_yticks(range(len(health.changes)), [one.name for one in health.changes])
-    ax.invert_yaxis()
-    ax.margins(x=0.15)
+    if max(map(abs, ax.get_xlim())) > 8.0:
+        ax.set_xscale("symlog", linthresh=3.0)
+    names_beside(ax, range(len(health.changes)), [one.name for one in health.changes])
+    ax.set_ylim(len(health.changes) - 0.5, -0.5)
     ax.set_xlabel("change in half widths of its interval")
     source = f" on {literal(health.source)}" if health.source else ""
     heading(ax, f"{health.model}{source}: {'unchanged' if health.healthy else 'changed'}")

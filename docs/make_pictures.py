@@ -1,0 +1,60 @@
+"""Draw the pictures of the pages that no example draws: what the code of the pages plots.
+
+Run as ``make pictures``, or ``python docs/make_pictures.py``: band.png, profiles.png, suggested.png
+and identified.png beside this file. The others are drawn by scripts in python/examples and benches,
+and by ``piezotrack demo`` and ``make benchmark``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+import piezotrack as pt
+
+mpl.use("Agg")
+DOCS = Path(__file__).parent
+
+
+def band() -> None:
+    """Draw a prediction with its band, on the log that was not fitted."""
+    fit = pt.identify(pt.datasets.dbo_training()[3.0:23.0], "prandtl-ishlinskii")
+    fit.prediction_band(pt.datasets.dbo_tracking()[30.0:40.0]).plot().savefig(DOCS / "band.png")
+
+
+def profiles() -> None:
+    """Draw the cost along each parameter of a Dahl stage."""
+    fit = pt.identify(pt.datasets.dbo_training()[3.0:23.0], "dahl", method=pt.Descents(seed=1))
+    fit.confidence(0.95).plot().savefig(DOCS / "profiles.png")
+
+
+def suggested() -> None:
+    """Draw the drive that determines the parameters of an identified stage best."""
+    true = pt.PrandtlIshlinskiiStage(
+        linear=0.8e-6,
+        thresholds=(5.0, 15.0, 30.0),
+        weights=(0.15e-6, 0.1e-6, 0.08e-6),
+        creep_weights=(0.02, 0.02),
+        creep_times=(0.2, 2.0),
+        time_constant=4e-3,
+    )
+    slow = 37.5 - 37.5 * np.cos(2.0 * np.pi * 0.5 * np.arange(2000) * 2e-3)
+    settings = pt.LeastSquares(
+        thresholds=[5.0, 15.0, 30.0], creep=[0.2, 2.0], dead_zones=False, dynamics="first"
+    )
+    record = pt.VirtualStage.of(true, noise=5e-9, seed=1).record(slow, 2e-3)
+    fit = pt.identify(record, "prandtl-ishlinskii", method=settings)
+    drive = pt.suggest_drive(fit, limits=(0.0, 75.0), slew=2000.0, seconds=4.0, dt=2e-3)
+    drive.plot().savefig(DOCS / "suggested.png")
+
+
+def identified() -> None:
+    """Draw measured and simulated displacement of the default model."""
+    pt.identify(pt.datasets.dbo_training()[3.0:23.0]).plot().savefig(DOCS / "identified.png")
+
+
+if __name__ == "__main__":
+    for draw in (band, profiles, suggested, identified):
+        draw()

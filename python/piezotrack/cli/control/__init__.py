@@ -1,0 +1,1 @@
+"""Commands that control a stage: tables, loops, gains, exports."""

@@ -1,0 +1,118 @@
+"""Controller files in the place of a model: what `tune` wrote, simulated as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...errors import DataError, ParameterError
+from .loop_options import PAPER, check_same_drive, known_model
+
+if TYPE_CHECKING:
+    from ...control.controller.controller import Controller
+    from ...identification.fitted.identified_model import IdentifiedModel
+    from ...stages.virtual import VirtualStage
+    from .loop_options import Simulation
+
+__all__ = ["controller_in", "only_controller", "stage_of_controller"]
+
+
+def controller_in(file: Path) -> Controller | None:
+    """Load a controller, or return None where the file is another.
+
+    Parameters
+    ----------
+    file : pathlib.Path
+        A controller file, or a model file.
+
+    Returns
+    -------
+    Controller or None
+        The controller.
+
+    Raises
+    ------
+    DataError
+        The file is missing, is no JSON, or is a controller with an entry that is wrong.
+    """
+    from ...control.controller.controller import FORMAT
+    from ...control.controller.load import load_controller
+    from ...identification.fitted.model_file import read_content
+
+    _, document = read_content(file)
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        return None
+    return load_controller(file)
+
+
+def only_controller(file: Path, remedy: str) -> Controller:
+    """Load a controller; a model is refused with what to do.
+
+    Parameters
+    ----------
+    file : pathlib.Path
+        The file.
+    remedy : str
+        What makes a controller of a model, or another option, as a sentence.
+
+    Returns
+    -------
+    Controller
+        The controller.
+
+    Raises
+    ------
+    DataError
+        The file is another.
+    """
+    from ...control.controller.load import load_controller
+    from ...identification.fitted.model_file import read_content
+
+    _, document = read_content(file)
+    if isinstance(document, dict) and document.get("format") == "piezotrack-model":
+        raise DataError(f"{file} is a model file: expected a controller file; {remedy}")
+    return load_controller(file)
+
+
+def stage_of_controller(
+    controller: Controller, stage: str | None, simulation: Simulation
+) -> tuple[VirtualStage, IdentifiedModel | None]:
+    """Make the stage that a controller of a file drives.
+
+    Parameters
+    ----------
+    controller : Controller
+        The controller.
+    stage : str or None
+        A model file, or the name of the stage of the paper; by default the stage that the
+        feedforward inverts.
+    simulation : Simulation
+        Noise of its sensor, bandwidth of its amplifier, and seed of the noise.
+
+    Returns
+    -------
+    VirtualStage
+        The stage.
+    IdentifiedModel or None
+        That of the model file.
+
+    Raises
+    ------
+    ParameterError
+        There is no stage, or its drive has another unit than the controller's.
+    """
+    from ...control.plant import plant_of_inverse
+    from ...stages.virtual import VirtualStage
+
+    parts: dict[str, Any] = simulation.parts
+    if stage == PAPER:
+        return VirtualStage.xu_li_2010(seed=simulation.seed), None
+    if stage is not None:
+        known = known_model(Path(stage), zero=False)
+        check_same_drive(known, stage, controller.drive_unit)
+        return VirtualStage.of(known, **parts), known
+    if controller.feedforward is None:
+        raise ParameterError(
+            "--stage", "missing", "a model file, as the controller has no feedforward to simulate"
+        )
+    return plant_of_inverse(controller.feedforward, **parts), None

@@ -1,0 +1,122 @@
+"""``piezotrack tune``: the gains of a controller for an identified model."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from ...errors import ParameterError
+from ..command import Argument, Option, command
+from ..option_groups import Motion
+from ..options import ModelFile, Sensitivity, Zero
+from ..output import Output
+from ..values import DECIBELS, DEGREES, LENGTH, LOOP_TIME, PERCENT
+from .loop_options import PAPER, LoopOptions, Simulation, Stage, known_model, zero_words
+
+__all__ = ["tune_command"]
+
+
+@command()
+def tune_command(
+    model: ModelFile,
+    references: Annotated[
+        list[str] | None,
+        Argument(
+            "Motions, as of `track`; without one the gains follow from the margins alone",
+            "REFERENCE",
+        ),
+    ] = None,
+    stage: Stage = None,
+    parts: Annotated[
+        str | None,
+        Option(
+            "Parts, of pid,low-pass,notch,repetitive; default those that stage and motions need",
+            metavar="NAMES",
+        ),
+    ] = None,
+    minimise: Annotated[
+        Literal["rms", "largest", "effort"],
+        Option("Error to minimise, or the effort within --largest-error"),
+    ] = "rms",
+    largest_error: Annotated[float | None, Option("Largest rms error, as 20nm", LENGTH)] = None,
+    gain_margin: Annotated[float, Option("Least gain margin", DECIBELS)] = 6.0,
+    phase_margin: Annotated[float, Option("Least phase margin", DEGREES)] = 30.0,
+    sensitivity: Sensitivity = 2.0,
+    gain_spread: Annotated[
+        float, Option("Range of the stage's gain about the model's", PERCENT)
+    ] = 0.0,
+    mode_spread: Annotated[
+        float, Option("Range of its dynamics, slower and faster", PERCENT)
+    ] = 0.0,
+    delay_spread: Annotated[float, Option("Largest delay in addition", LOOP_TIME)] = 0.0,
+    feedforward: Annotated[
+        bool, Option("Feedforward by the inverse of the model; default yes")
+    ] = True,
+    zero: Zero = False,
+    *,
+    motion: Motion,
+    loop: LoopOptions,
+    simulation: Simulation,
+    output: Output,
+) -> None:
+    """Find the gains of a controller under stability margins.
+
+    For the motions given, on the simulated stage; the controller file is what `track`, `contour`,
+    `play` and `export` take.
+    """
+    from ..._support.files.writing import picture_files
+    from ...control.tuning.goal import Goal, TuningSearch
+    from ...control.tuning.margins import Margins, Spread
+    from ...control.tuning.tune import tune
+    from ...control.tuning.tuned import picture_name
+
+    _within("--gain-margin", gain_margin, 1e-6, 400.0, "dB, above 0 and below 400")
+    _within("--phase-margin", phase_margin, 0.0, 180.0, "degrees, 0 to below 180")
+    _within("--sensitivity", sensitivity, 1.0, math.inf, "a factor above 1")
+    _within("--mode-spread", mode_spread, 0.0, 95.0, "per cent, 0 to below 95")
+    _within("--gain-spread", gain_spread, 0.0, 95.0, "per cent, 0 to below 95")
+    _within("--delay-spread", delay_spread, 0.0, math.inf, "a time of 0 or above")
+    if minimise == "effort" and largest_error is None:
+        raise ParameterError(
+            "--minimise", "effort without --largest-error", "--largest-error, as 20nm"
+        )
+    if largest_error is not None and not largest_error > 0.0:
+        raise ParameterError("--largest-error", f"{1e9 * largest_error:g} nm", "an error above 0")
+    own = stage != PAPER
+    simulation.check(own=own, searched=True)
+    known = known_model(model, zero=zero, paper=not own)
+    desired = [motion.of(text) for text in references or ()]
+    pictures = [name for i in range(len(desired)) for name in picture_files(picture_name(i))]
+    output.will_write(["controller.json", "tuning.json", *pictures])
+    plant = simulation.stage(stage, known)
+    tuned = tune(
+        [plant] if stage in (None, PAPER) else [plant, known],
+        desired or None,
+        dt=loop.interval(known, desired[0] if desired else None, own=own),
+        limits=loop.volts(known, own=own),
+        feedforward=known.inverse() if feedforward else None,
+        parts=None if parts is None else [one.strip() for one in parts.split(",")],
+        margins=Margins(
+            gain=10.0 ** (gain_margin / 20.0),
+            phase=math.radians(phase_margin),
+            sensitivity=sensitivity,
+        ),
+        spread=Spread(delay=(0.0, delay_spread), mode=0.01 * mode_spread, gain=0.01 * gain_spread),
+        goal=Goal(
+            minimise=minimise,
+            largest_error=math.inf if largest_error is None else largest_error,
+        ),
+        timing=simulation.timing,
+        search=TuningSearch(seed=simulation.seed),
+    )
+    words = f"stage: {stage or model.name}{zero_words(known)}\n{tuned}"
+    output.show(words, tuned.document(), output.write(tuned.save, "controller.json"))
+
+
+def _within(option: str, value: float, low: float, high: float, expected: str) -> None:
+    """Refuse a value by the name and in the unit of its option, which the library does not know.
+
+    0 is in its range, 1 is not.
+    """
+    if not (low < value < high or value == low == 0.0):
+        raise ParameterError(option, f"{value:g}", expected)

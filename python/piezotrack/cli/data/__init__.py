@@ -1,0 +1,1 @@
+"""Commands on logs: contents, other formats, noise."""

@@ -1,1 +1,0 @@
-"""Commands that show the package at work: the demonstration, and the paper."""

@@ -1,1 +1,0 @@
-"""Commands on logs: what they hold, and other formats."""

@@ -1,1 +1,0 @@
-"""Commands on controllers: tracking, contouring, learning, tuning, export."""

@@ -1,1 +1,0 @@
-"""Commands on models: their identification, comparison and simulation."""

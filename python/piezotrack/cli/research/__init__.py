@@ -1,0 +1,1 @@
+"""Demonstrations, benchmarks and the experiments of Xu and Li 2010."""
