@@ -60,7 +60,9 @@ def test_no_memory_is_an_exception_and_the_process_goes_on(name: str) -> None:
     ended = child(PREPARED.format(call=NONE[name]), room=600_000_000)
     assert (ended.returncode, ended.stderr) == (0, "")
     # NumPy's sentence where it is an array of its own that has no room.
-    pattern = r"MemoryError ([a-z]\D*: \d+ MB of memory are not to be had|Unable to allocate .*)\n"
+    pattern = (
+        r"MemoryError ([a-z]\D*: \d+ MB of memory cannot be allocated|Unable to allocate .*)\n"
+    )
     # The stacks of threads need memory too.
     pattern += "|OSError no threads could be started: .*\n"
     assert re.fullmatch(pattern, ended.stdout), ended.stdout

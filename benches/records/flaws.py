@@ -98,12 +98,12 @@ NAMED = {
     "saturated": r"saturat|clipped|cut off|at its end",
     "quantised": r"quanti[sz]|resolution|readings? (go|come|change)s? in steps",
     "NaN": r"missing|drop|fill",
-    "jump": r"jump|what the stage went through before|began",
+    "jump": r"jump|from the motion before the record|began",
 }
 
 # A sentence that says, of whatever cause, that the model may not hold.
 DOUBT = (
-    r"no kind|no model|cannot describe|does not|times the noise|fits as well|at this rate only|"
+    r"no kind|no model|cannot describe|does not|times the noise|fits equally well|at this rate only|"
     r"not determine|more than a sensor|of the squared residual|not fitted|shorter than a period|"
     r"goes from .* that of the record|ill-conditioned"
 )

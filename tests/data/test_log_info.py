@@ -57,7 +57,7 @@ def test_a_sine_of_one_amplitude_and_rate(tmp_path: Path) -> None:
     assert not report.drive.steps
     text = determined(report)
     assert "the loop between 0 V and 60 V: any model of hysteresis" in text
-    assert "one amplitude, 60 V: no smaller loops" in text
+    assert "one amplitude, 60 V: minor loops" in text
     assert "one rate, 1 Hz: lag, delay, creep and hysteresis cannot be distinguished" in text
     assert "no rests after the first motion" in text
     # (f/fn)^2 of 30 um is three times the noise.

@@ -174,7 +174,7 @@ def test_a_rate_that_the_device_rounds_is_in_the_log() -> None:
     used = device(rates=Rates(lowest=1.0, highest=1000.0, clock=1000.0))
     log = pt.measure(used, "sine:1Hz,0..75V,1s", rate=300.0)
     assert log.dt == pytest.approx(3.0 / 1000.0)
-    assert log.notes == ("rate: 333.3333 Hz obtained, 300 Hz asked for",)
+    assert log.notes == ("rate: 333.3333 Hz, requested 300 Hz",)
     with pytest.raises(pt.ParameterError, match=r"expected 333\.333333 Hz"):
         pt.measure(used, [0.0, 1.0, 2.0], rate=300.0)
 

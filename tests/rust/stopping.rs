@@ -108,7 +108,7 @@ fn a_ramp_in_blocks_is_the_ramp_in_samples() {
 #[test]
 fn memory_that_cannot_be_had_is_an_error_with_its_size() {
     let huge = usize::MAX / 16;
-    let sentence = "the motion: 9223372036855 MB of memory are not to be had";
+    let sentence = "the motion: 9223372036855 MB of memory cannot be allocated";
     assert_eq!(room::<f64>("the motion", huge).unwrap_err().to_string(), sentence);
     assert_eq!(zeros("the motion", huge).unwrap_err().to_string(), sentence);
     assert_eq!(available("the motion", huge, 8).unwrap_err().to_string(), sentence);

@@ -188,9 +188,7 @@ class Columns(list[Column]):
     def _set_unit(self, column: Column, unit: str) -> Column:
         stated = lookup(column.unit)
         if stated is not None and stated != lookup(unit) and not column.unit_from_caller:
-            self.notes.append(
-                f"{column} is taken in {unit}, as units= says, where the file says {column.unit}"
-            )
+            self.notes.append(f"{column}: unit {unit} by units=, {column.unit} in the file")
         self[column.index] = replace(column, unit=unit, unit_from_caller=True)
         return self[column.index]
 

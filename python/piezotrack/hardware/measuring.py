@@ -83,7 +83,7 @@ def obtained_rate(device: Device, rate: float) -> tuple[float, tuple[str, ...]]:
     near = device.rates.nearest(rate)
     if abs(near - rate) <= 1e-9 * rate:
         return near, ()
-    return near, (f"rate: {near:.7g} Hz obtained, {rate:.7g} Hz asked for",)
+    return near, (f"rate: {near:.7g} Hz, requested {rate:.7g} Hz",)
 
 
 def play_table(device: Device, volts: Array, rate: float, lead_in: float = 0.0) -> Record:

@@ -33,7 +33,7 @@ pub enum Error {
     #[error("{0}")]
     Numerical(String),
     /// Memory that cannot be had.
-    #[error("{what}: {} MB of memory are not to be had", bytes.div_ceil(1_000_000))]
+    #[error("{what}: {} MB of memory cannot be allocated", bytes.div_ceil(1_000_000))]
     Memory {
         /// Contents that it was to hold.
         what: String,

@@ -157,7 +157,7 @@ def test_a_progress_bar_still_steers_the_terminal(monkeypatch: pytest.MonkeyPatc
 
 def test_memory_that_is_not_to_be_had_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: Any, **__: Any) -> None:
-        raise MemoryError("the response: 960 MB of memory are not to be had")
+        raise MemoryError("the response: 960 MB of memory cannot be allocated")
 
     monkeypatch.setattr(pt.Inverse, "played", full)
-    assert refusal(*WORK) == "the response: 960 MB of memory are not to be had"
+    assert refusal(*WORK) == "the response: 960 MB of memory cannot be allocated"

@@ -119,7 +119,7 @@ def test_a_dataset_whose_samples_are_not_there_is_refused(tmp_path: Path) -> Non
         with h5py.File(path, "w") as file:
             file.create_dataset("voltage_V", shape=(10**12,), dtype="f8", **options)
             file["displacement_um"], file["time_s"] = Y, T
-        assert "dataset '/voltage_V' is said to have 8000000000000 bytes" in refusal(path)
+        assert "dataset '/voltage_V' declares 8000000000000 bytes" in refusal(path)
 
 
 def test_a_dataset_in_which_one_chunk_of_many_is_there_is_refused(tmp_path: Path) -> None:
@@ -127,7 +127,7 @@ def test_a_dataset_in_which_one_chunk_of_many_is_there_is_refused(tmp_path: Path
     with h5py.File(path, "w") as file:
         lying = file.create_dataset("voltage_V", shape=(10**11,), dtype="f8", chunks=(1000,))
         lying[:400] = U
-    assert "is said to have 800000000000 bytes" in refusal(path)
+    assert "declares 800000000000 bytes" in refusal(path)
 
 
 def test_a_heap_of_texts_that_is_no_chain_is_refused(tmp_path: Path) -> None:

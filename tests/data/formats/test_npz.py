@@ -128,7 +128,7 @@ def test_an_archive_that_expands_beyond_measure_is_refused(tmp_path: Path) -> No
             member.write(zeros)
     assert path.stat().st_size < 200_000
     found = refusal(path)
-    assert "array 'time_s' is said to have 115343360 bytes" in found
+    assert "array 'time_s' declares 115343360 bytes" in found
 
 
 def test_a_long_constant_signal_beside_a_measured_one_is_read(tmp_path: Path) -> None:

@@ -60,7 +60,7 @@ def test_more_rows_than_the_file_can_hold_are_refused(tmp_path: Path) -> None:
     table = arrow.table({"time_s": np.zeros(20_000_000)})
     parquet.write_table(table, tmp_path / "log.parquet", compression="zstd")
     assert (tmp_path / "log.parquet").stat().st_size < 100_000
-    assert "each column is said to have 160000000 bytes" in refusal(tmp_path / "log.parquet")
+    assert "each column declares 160000000 bytes" in refusal(tmp_path / "log.parquet")
 
 
 def test_a_file_that_is_cut_off_is_refused(tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ def test_the_least_lag_is_taken_and_the_range_is_told() -> None:
     # With a free damping this model took 2.9 ms, and was 54 % of the stroke off at 10 Hz.
     assert fit.lags.least < 1e-3 < fit.lags.most
     assert percent(fit, record(10.0, rate=5000.0)[0.1:]) < 2.0
-    assert any("fits as well" in note and "another rate" in note for note in fit.notes)
+    assert any("fits equally well" in note and "another rate" in note for note in fit.notes)
     # The record shows no mode: the mass is too small to matter, and not searched.
     assert not fit.parameters["mass"].free
     natural = np.sqrt(fit.model.stiffness / fit.model.mass) / (2.0 * np.pi)

@@ -166,7 +166,7 @@ def test_a_second_level_may_be_a_step_of_its_own() -> None:
 
 def test_levels_that_are_proportional_tell_no_stiffness() -> None:
     for level in [(37.5, STEADY / 2), (37.5, 55e-6), (75.0, STEADY)]:
-        with pytest.raises(pt.DataError, match="cannot tell the stiffness"):
+        with pytest.raises(pt.DataError, match="do not determine the stiffness"):
             pt.identify_step(pt.identification.StepReadings.xu_li_2010(), second_level=level)
 
 

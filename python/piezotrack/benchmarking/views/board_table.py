@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 __all__ = ["board_markdown", "board_text"]
 
 NOTES = """\
-default: pt.identify(log), and what it chose. Errors are rms in per cent of the stroke fitted; um:
+default: the model chosen by pt.identify(log). Errors are rms in per cent of the stroke fitted; um:
 largest error on the last part. K: values fitted. s: time of the fit, on this computer, beside
 whatever else it did. inverse: its drive for the measured displacement of a part not fitted, less
 the recorded drive, rms in per cent of the drive's range."""

@@ -151,7 +151,7 @@ def check_within_reach(
                 f"{1e6 * edge:.4g} um",
                 f"{1e6 * bottom:.4g} to {1e6 * top:.4g} um on the sensor, which this stage "
                 f"reaches from {scale * low:g} to {scale * high:g} {unit}, or beyond_reach=True"
-                + ("; fit.zeroed() counts from the beginning of its record" if shifted else ""),
+                + ("; fit.zeroed() takes the beginning of its record as 0" if shifted else ""),
             )
     # The loop stays above the curve from rest: once up, the stage no longer comes all the way down.
     k = int(np.argmax(samples.x))
@@ -162,8 +162,8 @@ def check_within_reach(
             "reference",
             f"{1e6 * samples.x[k]:.4g} um at {samples.t[k]:.4g} s, {1e6 * past:.3g} um below "
             f"{1e6 * lowest:.4g} um",
-            f"what the stage reaches at {scale * low:g} {unit} on the settled loop, from "
-            f"{1e6 * samples.x.max():.4g} um down, or beyond_reach=True",
+            f"displacements that the stage reaches at {scale * low:g} {unit} on the settled loop, "
+            f"from {1e6 * samples.x.max():.4g} um down, or beyond_reach=True",
         )
 
 

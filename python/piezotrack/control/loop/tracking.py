@@ -59,15 +59,15 @@ class Metrics(ErrorStatistics):
         if self.phase_lag is not None:
             rows.append(("phase lag", f"{math.degrees(self.phase_lag):.3g}\N{DEGREE SIGN}"))
         if self.widest_loop is not None:
-            rows.append(("widest loop", f"{100.0 * self.widest_loop:.3g} % of travel"))
+            rows.append(("residual hysteresis", f"{100.0 * self.widest_loop:.3g} % of travel"))
         return rows
 
     def __str__(self) -> str:
         text = super().__str__()
         if self.phase_lag is not None:
-            text += f", phase lag {self.phase_lag:.4f} rad"
+            text += f", phase lag {math.degrees(self.phase_lag):.3g} deg"
         if self.widest_loop is not None:
-            text += f", widest loop {100.0 * self.widest_loop:.2f} % of travel"
+            text += f", residual hysteresis {100.0 * self.widest_loop:.2f} % of travel"
         return text
 
 

@@ -97,13 +97,13 @@ def wait_until(instant: float, clock: Callable[[], float] = time.perf_counter) -
 
 
 def check_exchanging(device: object) -> Exchanging:
-    """Return a device that can be asked sample by sample, or raise ParameterError."""
+    """Return a device that reads sample by sample, or raise ParameterError."""
     check_device(device)
     if not isinstance(device, Exchanging):
         raise ParameterError(
             "device",
             f"{type(device).__name__}, which has no exchange",
-            "one that can be asked sample by sample; pt.play and pt.learn need none",
+            "one that reads sample by sample; pt.play and pt.learn need none",
         )
     return device
 

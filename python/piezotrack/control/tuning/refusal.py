@@ -47,8 +47,8 @@ class _Short(NamedTuple):
         return ParameterError(
             f"margins.{self.name}",
             plain,
-            f"one that some gains can keep; where {bound} or {side} was asked for, the nearest "
-            f"have {nearest} ({names[self.plant]}){f', {off}' if self.factor > 1.1 else ''}",
+            f"one that some gains can keep; for {bound} or {side}, the nearest gains "
+            f"reach {nearest} ({names[self.plant]}){f', {off}' if self.factor > 1.1 else ''}",
         )
 
 
@@ -65,8 +65,8 @@ def refusal(problem: TuningProblem, nearest: Solution) -> ParameterError:
     if outcome["excess"] <= 1.0:
         worst = max(nearest.kept, key=lambda one: one.share)
         return ParameterError(
-            f"margins: the search found no gains whose exact margins are as asked for; the nearest "
-            f"have {worst}: expected a milder margin, more particles or more iterations",
+            f"margins: the search found no gains whose exact margins are as required; the "
+            f"nearest have {worst}: expected a milder margin, more particles or more iterations",
             argument="margins",
         )
     if robustness[0][0] > 0.0:

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 __all__ = ["heading", "learning_text", "outcome", "trial_line"]
 
 WHY = {
-    "noise": "what repeats in the error is not distinguishable from the noise",
-    "no change": "the error falls no further",
-    "not settled": "the error falls no further, and the motion has not settled when it is "
+    "noise": "the repeatable error is below the noise",
+    "no change": "no further improvement",
+    "not settled": "no further improvement, and the motion has not settled when it is "
     "recorded: expected more periods before the record (settle=), or a faster loop",
     "grows": "the error grows",
     "trials": "all trials were made",

@@ -1,4 +1,4 @@
-"""How drive and displacement of a record go together: swapped, of the other sign, or not at all."""
+"""Correlation of drive and displacement of a record: swapped, of the other sign, or not at all."""
 
 from __future__ import annotations
 

@@ -158,7 +158,9 @@ class LogInfo:
         if self.determines:
             lines += ["", "can determine", *(f"  {text}" for text in self.determines)]
             if self.drive is not None and self.drive.turns and self.stroke:
-                lines.append("  for what is not in it, with a first model: piezotrack suggest")
+                lines.append(
+                    "  for the drive to record next, with a first model: piezotrack suggest"
+                )
         lines += [f"note  {note}" for note in self.notes]
         if self.problem:
             lines += ["", f"is not read as it is: {self.problem}"]
@@ -296,7 +298,7 @@ def info(
     >>> found.drive.turns, round(1.0 / found.time.interval)
     (19, 100)
     >>> print(found.determines[1])
-    one amplitude, 60 V: no smaller loops; weights of small plays are those of this loop
+    one amplitude, 60 V: minor loops cannot be predicted
     """
     log = Log(path, skip)
     given = {"time": time, "drive": drive, "displacement": displacement}
@@ -344,7 +346,7 @@ def info(
         spare = sampling_notes(u, times.interval, 0.0 if features is None else features.mode_limit)
     sentences: list[str] = []
     if connection is not None and not connection.follows:
-        sentences = ["no model before drive and displacement go together: see the note"]
+        sentences = ["no model: drive and displacement are not correlated, see the note"]
     elif times is not None and features is not None:
         sentences = drive_notes(times, features, stroke)
     elif stroke is not None and problems and problems[0].startswith(NO_DRIVE):

@@ -193,12 +193,12 @@ class Source:
         """
         if stored is not None and declared > stored:
             raise self.error(
-                f"{what} is said to have {declared} bytes: expected {stored} at most, in a file "
+                f"{what} declares {declared} bytes: expected {stored} at most, in a file "
                 f"of {self.size} bytes"
             )
         if declared > self.most:
             raise self.error(
-                f"{what} is said to have {declared} bytes: expected {DENSEST * self.size} at most, "
+                f"{what} declares {declared} bytes: expected {DENSEST * self.size} at most, "
                 f"as measured samples in a file of {self.size} bytes"
             )
 

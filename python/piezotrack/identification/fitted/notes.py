@@ -263,13 +263,13 @@ def lag_notes(lags: LagRange | None, frequency: float) -> list[str]:
     if lags.from_zero or share < VISCOUS:
         least = 0.0 if lags.from_zero else lags.least
         return [
-            f"any lag from {1e3 * least:.2g} to {1e3 * lags.most:.2g} ms fits as well: a record at "
-            "another rate would tell"
+            f"any lag from {1e3 * least:.2g} to {1e3 * lags.most:.2g} ms fits equally well; a record "
+            "at another rate determines it"
         ]
     return [
-        f"a lag of {1e3 * lags.least:.3g} ms makes {100 * share:.2g} % of the travel at this rate, "
-        "and no shorter one fits: the model holds at this rate only; whether it is due to damping, "
-        "creep or a late reading, a record at another rate would tell"
+        f"the lag of {1e3 * lags.least:.3g} ms contributes {100 * share:.2g} % of the travel at "
+        "this rate, and no shorter one fits: the model holds at this rate only. A record at another "
+        "rate distinguishes damping, creep and sensor delay"
     ]
 
 
@@ -305,7 +305,6 @@ def first_samples(rest: Array, data: Dataset) -> list[str]:
     until = float(data.t[min(int(above[-1]) + 1 if above.size else count, rest.size - 1)])
     share = 100.0 * squares[count - 1] / squares[-1]
     return [
-        f"{share:.0f} % of the squared residual is in the first {until - data.t[0]:.3g} s: what "
-        f"the stage went through before the record shows there; leave it out with "
-        f"log[{until:.4g}:]"
+        f"{share:.0f} % of the squared residual is in the first {until - data.t[0]:.3g} s, from "
+        f"the motion before the record; leave it out with log[{until:.4g}:]"
     ]

@@ -22,7 +22,7 @@ COLUMNS = (
 )
 NOTES = """\
 rms on what was fitted, in % of the stroke, of the seeds; agree: seeds within 0.1 % of the lowest.
-More parameters always fit better: to choose a model, judge it on what was not fitted (compare)."""
+To choose a model, test it on other data (compare)."""
 
 
 def campaign_text(campaign: Campaign) -> str:
@@ -48,7 +48,7 @@ def campaign_text(campaign: Campaign) -> str:
     if failed:
         lines += ["The same call tries them again.", ""]
     if noted := sum(bool(one.notes) for one in campaign):
-        lines.append(f"note  {noted} of {len(campaign)} results have notes, see its .notes")
+        lines.append(f"note  {noted} of {len(campaign)} results have notes: see its .notes")
     return "\n".join([*lines, NOTES])
 
 

@@ -174,7 +174,7 @@ def predicted(model: IdentifiedModel) -> list[Row]:
     noise = f"noise {length_text(shares.noise, 3)}"
     repeats = f"{length_text(shares.model_error, 3)} repeats in every period"
     if shares.model_error > shares.noise:
-        limit = f"the model: {repeats}, which no interval covers; {noise}"
+        limit = f"the model: {repeats} (in no interval); {noise}"
     else:
         limit = f"the sensor: {noise}; {repeats}"
     return [("predicted", within), ("limit", limit)]

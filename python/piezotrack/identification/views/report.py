@@ -205,7 +205,7 @@ def _undetermined(fit: Identification) -> list[str]:
     if unclear := [n for n, e in fit.parameters.items() if not (e.identified or e.from_prior)]:
         lines.append(
             f"Not determined by {which}: {', '.join(unclear)}.\n"
-            "What to measure next: piezotrack suggest, in Python pt.suggest_drive."
+            "Drive to record next: piezotrack suggest, in Python pt.suggest_drive."
         )
     if known := [n for n, e in fit.parameters.items() if e.from_prior]:
         lines.append(f"Known by their priors, not by {which}: " + ", ".join(known) + ".")

@@ -190,7 +190,7 @@ impl Repetitive {
         }
         let shortest = samples - delay + count(half) + 1.0;
         let right = samples >= shortest;
-        let expected = "longer than the filter's lag and one sample together";
+        let expected = "longer than the sum of the filter's lag and one sample";
         check("period", self.period, "s", right, expected)?;
         let sampled = self.taps(delay, pole, &q, half).for_period(samples);
         let right = sampled.lead < sampled.nearest;

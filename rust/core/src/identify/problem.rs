@@ -424,7 +424,7 @@ fn check_tied(spec: &Spec, relations: &Relations, fixed: &mut Fixed) -> Result<(
             return Err(Error::parameter(
                 format!("tie of {name}"),
                 shown_text(&tie.text),
-                format!("no {said} of {name} besides"),
+                format!("no {said} of {name} in addition"),
             ));
         }
         fixed[tie.parameter] = None;

@@ -33,7 +33,7 @@ impl<const AXES: usize> Looks<AXES> {
         });
         let mut seen = [const { Vec::new() }; AXES];
         for line in &mut seen {
-            *line = room("what the sensor has seen", samples)?;
+            *line = room("delayed readings of the sensor", samples)?;
         }
         Ok(Self { ends, place, whole: delays.map(|delay| delay.whole), seen })
     }

@@ -108,7 +108,7 @@ def _check_heap(source: Source, content: mmap.mmap, first: int) -> dict[int, int
         if step < HEADER or place + step > end:
             raise source.error(
                 f"is not a sound HDF5 file: in the heap at byte {first} an object at byte {place} "
-                f"is said to have {count} bytes, expected {end - place - HEADER} at most"
+                f"declares {count} bytes, expected {end - place - HEADER} at most"
             )
         sizes[number] = count
         place += step

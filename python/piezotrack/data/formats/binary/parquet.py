@@ -26,7 +26,7 @@ def _opens(source: Source) -> ChannelTable:
     with source.decoding("Parquet"), parquet.ParquetFile(source.path) as file:
         rows = file.metadata.num_rows
         if rows < 0:
-            raise source.error(f"is said to have {rows} rows: expected a number above 0")
+            raise source.error(f"declares {rows} rows: expected a number above 0")
         source.check_size("each column", 8 * rows)
         _check_groups(source, file.metadata)
         channels = []

@@ -191,8 +191,8 @@ pub fn separate(hysteresis: &Conventional, one: (f64, f64), two: (f64, f64)) -> 
         return Ok((stiffness, coefficient));
     }
     Err(Error::Data(format!(
-        "the levels {:.6} um at {u1} V and {:.6} um at {u2} V cannot tell the stiffness: the \
-         hysteresis with b1 = {:.5e} asks for a gain that falls with the voltage; give the \
+        "the levels {:.6} um at {u1} V and {:.6} um at {u2} V do not determine the stiffness: with \
+         b1 = {:.5e} the gain would fall with the voltage; give the \
          stiffness or the mass instead",
         1e6 * x1,
         1e6 * x2,

@@ -54,7 +54,7 @@ impl Plan {
         let particles = self.runs * each;
         if particles > MOST_PARTICLES {
             let expected = format!(
-                "{} at most with {each} particles in each: {MOST_PARTICLES} together",
+                "{} at most, with {each} particles in each: {MOST_PARTICLES} in all",
                 (MOST_PARTICLES / each).max(1)
             );
             return Err(Error::parameter("runs", self.runs, expected));
