@@ -386,9 +386,9 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ),
     ({"ties": {"b1": "log(0 - a2)"}}, "tie of b1 .*, NaN N/m.2 in the middle of the bounds"),
     ({"ties": {"damping": "0 - stiffness"}}, "tie of damping .*, -.* N s/m in the middle"),
-    ({"ties": {"b1": "a2"}, "fixed": F | {"b1": 1.0}}, "expected no value of b1 besides"),
-    ({"ties": {"b1": "a2"}, "bounds": {"b1": (1.0, 2.0)}}, "expected no bounds of b1 besides"),
-    ({"ties": {"b1": "a2"}, "scales": {"b1": "log"}}, "expected no scale of b1 besides"),
+    ({"ties": {"b1": "a2"}, "fixed": F | {"b1": 1.0}}, "expected no value of b1 in addition"),
+    ({"ties": {"b1": "a2"}, "bounds": {"b1": (1.0, 2.0)}}, "expected no bounds of b1 in addition"),
+    ({"ties": {"b1": "a2"}, "scales": {"b1": "log"}}, "expected no scale of b1 in addition"),
     (
         {"ties": {"stiffness": "2 * piezo_coefficient"}, "fixed": {"a1": 1.0}},
         "tie of stiffness .* determine only their ratios",

@@ -263,13 +263,13 @@ def lag_notes(lags: LagRange | None, frequency: float) -> list[str]:
     if lags.from_zero or share < VISCOUS:
         least = 0.0 if lags.from_zero else lags.least
         return [
-            f"any lag from {1e3 * least:.2g} to {1e3 * lags.most:.2g} ms fits equally well; a record "
-            "at another rate determines it"
+            f"any lag from {1e3 * least:.2g} to {1e3 * lags.most:.2g} ms fits equally well; a "
+            "record at another rate determines it"
         ]
     return [
         f"the lag of {1e3 * lags.least:.3g} ms contributes {100 * share:.2g} % of the travel at "
-        "this rate, and no shorter one fits: the model holds at this rate only. A record at another "
-        "rate distinguishes damping, creep and sensor delay"
+        "this rate, and no shorter one fits: the model holds at this rate only. A record at "
+        "another rate distinguishes damping, creep and sensor delay"
     ]
 
 
