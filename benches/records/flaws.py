@@ -104,7 +104,8 @@ NAMED = {
 # A sentence that says, of whatever cause, that the model may not hold.
 DOUBT = (
     r"no kind|no model|cannot describe|does not|times the noise|fits equally well|"
-    r"at this rate only|not determine|more than a sensor|of the squared residual|not fitted|shorter than a period|"
+    r"at this rate only|not determine|more than a sensor|of the squared residual|not fitted|"
+    r"shorter than a period|"
     r"goes from .* that of the record|ill-conditioned"
 )
 
