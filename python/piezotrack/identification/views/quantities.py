@@ -172,11 +172,9 @@ def predicted(model: IdentifiedModel) -> list[Row]:
     if (shares := covariance.shares) is None:
         return [("predicted", within)]
     noise = f"noise {length_text(shares.noise, 3)}"
-    repeats = f"{length_text(shares.model_error, 3)} repeats in every period"
-    if shares.model_error > shares.noise:
-        limit = f"the model: {repeats} (in no interval); {noise}"
-    else:
-        limit = f"the sensor: {noise}; {repeats}"
+    repeats = f"repeatable error {length_text(shares.model_error, 3)}"
+    model_limits = shares.model_error > shares.noise
+    limit = f"the model: {repeats}; {noise}" if model_limits else f"the sensor: {noise}; {repeats}"
     return [("predicted", within), ("limit", limit)]
 
 
