@@ -92,6 +92,13 @@ def campaign() -> pt.identification.Campaign:
         return pt.campaign(records, models, range(3), folder=folder)
 
 
+def windows() -> pt.identification.Campaign:
+    """One model of eight windows."""
+    records = {f"window {i}": log()[3.0 + i : 4.0 + i] for i in range(8)}
+    with TemporaryDirectory() as folder:
+        return pt.campaign(records, {"plays": {"model": "prandtl-ishlinskii"}}, folder=folder)
+
+
 def on_device() -> Any:
     reference = pt.sine(frequency=1.0, low=20e-6, high=40e-6, duration=2.0)
     return pt.track(VirtualDevice(stage()), loop(), reference, beyond_reach=True)
@@ -135,6 +142,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
         ["asymmetry"], ["plays-nnls", "prandtl-ishlinskii", "first-order-dahl"]
     ),
     "Campaign": campaign,
+    "Campaign, one model": windows,
     "Comparison": lambda: pt.compare(
         log(), ["prandtl-ishlinskii", "preisach", "duhem", "maxwell-slip"]
     ),
