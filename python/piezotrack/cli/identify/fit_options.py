@@ -422,6 +422,10 @@ def _creep(text: str | None) -> bool | list[float] | None:
 
 def _time(option: str, text: str, expected: str) -> float:
     try:
-        return LOOP_TIME.parse(option, text) if option == "--sensor-delay" else TIME.parse(option, text)
+        return (
+            LOOP_TIME.parse(option, text)
+            if option == "--sensor-delay"
+            else TIME.parse(option, text)
+        )
     except ParameterError:
         raise ParameterError(option, f"'{text}'", expected, verb="has") from None

@@ -181,20 +181,7 @@ def _drives(drives: Drives) -> Figure:
 
 @drawing
 def plot_reproduction(reproduction: Reproduction, fig: Figure | SubFigure | None = None) -> Figure:
-    """Draw obtained over published of every number, with quartiles, in the order of the paper.
-
-    Parameters
-    ----------
-    reproduction : Reproduction
-        The numbers.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Draw obtained over published of every number, with quartiles, in the order of the paper."""
     rows = reproduction.obtained
     figure = panels(fig, (11.0, 5.0))
     ax = figure.subplots()
