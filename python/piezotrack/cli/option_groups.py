@@ -101,7 +101,7 @@ class Columns(DriveColumns, DisplacementColumns):
 
     missing: Annotated[
         Literal["drop", "fill"] | None,
-        Option("Missing readings (NaN): left out, or on straight lines; default refused"),
+        Option("Missing readings (NaN): left out, or interpolated; default refused"),
     ] = None
 
 
