@@ -48,7 +48,6 @@ suppress_warnings = ["sphinx_gallery.space_in_filename"]
 # Docstrings: a name in single quotes is a link where it is a public one, else code.
 default_role = "py:obj"
 autodoc_typehints = "none"
-autodoc_preserve_defaults = True
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False
 napoleon_custom_sections = [("Attributes", "params_style")]

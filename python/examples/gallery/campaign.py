@@ -14,4 +14,8 @@ records = {f"{begin} to {begin + 4} s": log.cut(begin, begin + 4) for begin in (
 models = ["prandtl-ishlinskii", "duhem"]
 found = pt.campaign(records, models, folder=tempfile.mkdtemp())
 print(found.summary())
+
+# %%
+# One line for each record, one colour for each model.
+
 found.plot()

@@ -20,6 +20,10 @@ loops = {
     "feedforward": pt.Controller.of(fit),
     "feedforward and PI": pt.Controller.of(fit, feedback=feedback),
 }
+
+# %%
+# The error of each, over time.
+
 fig, ax = plt.subplots(figsize=(8, 3.5), layout="constrained")
 for name, loop in loops.items():
     run = pt.track(stage, loop, triangle)
