@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs crate-docs architecture pictures notices c-library c-header c-header-test clean
+.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs crate-docs architecture pictures notices c-library c-header c-header-test sentences clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -107,6 +107,10 @@ architecture: $(VENV)/installed ## Draw docs/architecture.svg from the code
 
 pictures: $(VENV)/installed ## Draw the pictures of the pages that no example draws
 	$(BIN)/python docs/make_pictures.py
+
+sentences: $(VENV)/pip ## All sentences that the program prints, to be read: target/sentences.txt
+	@mkdir -p target
+	$(BIN)/python .ci/sentences.py > target/sentences.txt
 
 notices: ## Write THIRD-PARTY.txt: the licences of the crates that are linked in
 	$(PYTHON) docs/make_notices.py

@@ -42,11 +42,12 @@ myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 
 sphinx_gallery_conf = settings()
+# It means the path of the repository, in which a space breaks no link.
+suppress_warnings = ["sphinx_gallery.space_in_filename"]
 
 # Docstrings: a name in single quotes is a link where it is a public one, else code.
 default_role = "py:obj"
 autodoc_typehints = "none"
-autodoc_preserve_defaults = True
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False
 napoleon_custom_sections = [("Attributes", "params_style")]

@@ -68,6 +68,9 @@ def resolve(
     if len(found) != 1:
         return None
     entry = objects[found[0]]
+    # A word in quotes, as the argument `models`, is not some attribute of that name.
+    if "." not in target and entry.objtype in ("attribute", "method", "property"):
+        return None
     return make_refnode(
         app.builder, node["refdoc"], entry.docname, entry.node_id, content, found[0]
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import cache
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -11,8 +12,9 @@ import numpy as np
 import piezotrack as pt
 from campaigns import QUICK
 from piezotrack.cli.research.loop_plot import plot_before_and_after
+from piezotrack.control.on_device.closed_loop import DeviceTracking
+from piezotrack.control.on_device.latency import latency_of
 from piezotrack.control.views.tracking_plot import plot_feedforward
-from piezotrack.hardware.virtual import VirtualDevice
 from piezotrack.identification.views.plot import plot_response
 from watched_records import model_watched, watched
 
@@ -92,9 +94,20 @@ def campaign() -> pt.identification.Campaign:
         return pt.campaign(records, models, range(3), folder=folder)
 
 
-def on_device() -> Any:
+def windows() -> pt.identification.Campaign:
+    """One model of eight windows."""
+    records = {f"window {i}": log()[3.0 + i : 4.0 + i] for i in range(8)}
+    with TemporaryDirectory() as folder:
+        return pt.campaign(records, {"plays": {"model": "prandtl-ishlinskii"}}, folder=folder)
+
+
+def on_device() -> DeviceTracking:
+    """As on a device that begins far from the reference, without waiting for its clock."""
     reference = pt.sine(frequency=1.0, low=20e-6, high=40e-6, duration=2.0)
-    return pt.track(VirtualDevice(stage()), loop(), reference, beyond_reach=True)
+    run = pt.track(stage(), loop(), reference, beyond_reach=True)
+    late = np.full(run.t.size, 1e-4)
+    values = {one.name: getattr(run, one.name) for one in fields(run)}
+    return DeviceTracking(**values, latency=latency_of(late), lateness=late)
 
 
 def tuned() -> pt.control.Tuned:
@@ -135,6 +148,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
         ["asymmetry"], ["plays-nnls", "prandtl-ishlinskii", "first-order-dahl"]
     ),
     "Campaign": campaign,
+    "Campaign, one model": windows,
     "Comparison": lambda: pt.compare(
         log(), ["prandtl-ishlinskii", "preisach", "duhem", "maxwell-slip"]
     ),

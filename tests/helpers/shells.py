@@ -38,18 +38,18 @@ PATHS = [
     "path.csv",
     "spiral:1Hz,2um,pitch=2um",
 ]
+POSITIONAL = {"REFERENCE": REFERENCES, "PATH": PATHS}
 OPTIONS: dict[str, list[str]] = {
     "--dt": NUMBERS,
     "--limits": ["0:75", "75:0", "0:", ":", "nan:1", "-1e308:1e308", "0:75:80", "x"],
+    **dict.fromkeys(("--kp", "--ti", "--td", "--tt", "--kq", "--tq"), GAINS),
     **dict.fromkeys(
-        ("--kp", "--ti", "--td", "--tt", "--kq", "--tq", "--stiffness", "--mass"), GAINS
+        ("--delay", "--sensor-delay", "--jitter", "--lag", "--dt", "--duration", "--period"),
+        NUMBERS,
     ),
-    **dict.fromkeys(("--delay", "--jitter", "--lag", "--dt", "--duration", "--period"), NUMBERS),
     **dict.fromkeys(("--seed", "--runs", "--threads"), WHOLE),
-    "--reference": REFERENCES,
-    "--path": PATHS,
     "--cross-talk": ["0.01:0.01", "x", "1e300:1", "0.01"],
-    **dict.fromkeys(("--window", "--window", "--test"), RANGES),
+    **dict.fromkeys(("--window", "--test-window"), RANGES),
     "--fix": ["mass=0.1", "mass=x", "=1", "mass=nan", "none=1", "mass=0.1=2"],
     "--bound": ["mass=0.1:0.2", "mass=0.2:0.1", "mass=x:1", "mass=:", "a=1:2"],
     "--free": ["mass", "", "mass,,x", "mass,mass"],
@@ -57,25 +57,24 @@ OPTIONS: dict[str, list[str]] = {
     **dict.fromkeys(("--time", "--drive", "--displacement"), NAMES),
     "--hold": ["foh", "zoh", "x"],
     "--model": ["dahl", "bouc-wen", "prandtl-ishlinskii", "none", "model.json", ""],
-    "--second-level": ["40:50", "x", "0:0", "1:nan"],
+    "--second-level": ["40V:50um", "40:50", "x", "0:0", "1:nan"],
     "--parts": ["pid", "pid,low-pass", "notch", "repetitive", "pid,,", "x", ""],
     "--minimise": ["rms", "largest", "x", ""],
     **{key: ["2", "1", "1.2", *NUMBERS] for key in ("--gain-margin", "--sensitivity")},
     "--phase-margin": ["30", "0", "180", *NUMBERS],
     **{key: ["10", "95", *NUMBERS] for key in ("--mode-spread", "--gain-spread")},
     "--delay-spread": ["0.002", *NUMBERS],
-    "--noise": ["30", *NUMBERS],
+    "--noise": ["30nm", "30", *NUMBERS],
     "--bandwidth": ["100", *NUMBERS],
     "--controllers": ["inverse", "inverse, PID", "network", "inverse + PD", "x", "", ","],
-    "--rates": ["0.5,1,2", "2,1", "1,1,1", "0,1,2", "x,1,2", "1e-9,1,1e9", ""],
+    "--frequencies": ["0.5,1,2", "2,1", "1,1,1", "0,1,2", "x,1,2", "1e-9,1,1e9", ""],
     "--stage": ["model.json", "xu-li-2010", "none.json", ""],
-    "--seeds": ["1", "2", "0", "101", *WHOLE],
+    "--draws": ["1", "2", "0", "101", *WHOLE],
     "--trials": ["1", "3", "10001", *WHOLE],
-    "--method": ["frequency", "lifted", "x"],
+    "--method": ["descents", "swarm", "spso-2011", "x"],
     "--gain": ["0.7", "2", *NUMBERS],
     "--cutoff": ["5", "24", *NUMBERS],
     "--mode-scales": ["1", "0.9,1,1.1", "1,", "x", "0", "1e300,1"],
-    "--swarm": ["default", "spso-2011", "none"],
     "--device": [
         "virtual:",
         "virtual:model.json",
@@ -101,7 +100,7 @@ LOOP = ("--dt", "--limits", "--kp", "--ti", "--td", "--delay", "--jitter", "--se
 COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
     "simulate": (["model.json", "log.csv"], (*COLUMNS, "--hold")),
     "feedforward": (["model.json", "REFERENCE"], ("--dt", "--duration", "--period")),
-    "track": (["model.json"], (*LOOP, "--period", "--tq", "--kq", "--tt")),
+    "track": (["model.json", "REFERENCE"], (*LOOP, "--period", "--tq", "--kq", "--tt")),
     "tune": (
         ["model.json", "--dt", "0.02", "--limits", "0:75", "--parts", "pid"],
         ("--dt", "--limits", "--delay", "--seed", "--duration", "--period",
@@ -109,46 +108,49 @@ COMMANDS: dict[str, tuple[list[str], tuple[str, ...]]] = {
          "--mode-spread", "--gain-spread", "--delay-spread", "--noise", "--bandwidth"),
     ),
     "compare-controllers": (
-        ["model.json", "--dt", "0.02", "--limits", "0:75", "--rates", "0.5,1,2",
+        ["model.json", "--dt", "0.02", "--limits", "0:75", "--frequencies", "0.5,1,2",
          "--controllers", "inverse"],
-        ("--dt", "--limits", "--delay", "--seed", "--seeds", "--rates", "--stage",
+        ("--dt", "--limits", "--delay", "--seed", "--draws", "--frequencies", "--stage",
          "--controllers", "--sensitivity", "--noise", "--bandwidth"),
     ),
     "learn": (
         ["model.json", "--dt", "0.02", "--limits", "0:75", REFERENCES[0],
          "--trials", "3"],
         ("--dt", "--limits", "--kp", "--ti", "--td", "--delay", "--seed",
-         "--duration", "--period", "--stage", "--trials", "--method", "--gain", "--cutoff",
+         "--duration", "--period", "--stage", "--trials", "--gain", "--cutoff",
          "--mode-scales", "--noise", "--bandwidth", "--device", "--rest"),
     ),
-    "contour": (["model.json"], (*LOOP, "--lag", "--cross-talk", "--dt")),
+    "contour": (["model.json", "PATH"], (*LOOP, "--lag", "--cross-talk")),
     "identify": (
         ["log.csv", "--runs", "1"],
         (*COLUMNS, "--displacement", "--hold", "--window", "--threads", "--fix", "--bound",
-         "--free", "--model", "--stiffness", "--delay", "--swarm", "--seed"),
+         "--free", "--model", "--sensor-delay", "--method", "--seed"),
     ),
     "export": (["controller.json"], ("--to", "--name", "--duration", "--period")),
-    "compare": (["log.csv", "--runs", "1"], (*COLUMNS, "--window", "--test", "--model", "--seed")),
+    "compare": (
+        ["log.csv", "--runs", "1"],
+        (*COLUMNS, "--window", "--test-window", "--model", "--seed"),
+    ),
     "benchmark": (
         ["log.csv", "--model", "plays-nnls"],
-        (*COLUMNS, "--displacement", "--hold", "--window", "--test", "--model"),
+        (*COLUMNS, "--displacement", "--hold", "--window", "--test-window", "--model"),
     ),
-    "step": (["log.csv"], (*COLUMNS, "--stiffness", "--mass", "--second-level", "--window")),
+    "step": (["log.csv"], (*COLUMNS, "--fix", "--second-level", "--window")),
     "watch": (["model.json", "log.csv"], (*COLUMNS, "--displacement", "--hold", "--window")),
     "noise": (["log.csv"], ("--dt", "--unit", "--time", "--displacement", "--window")),
     "info": (["log.csv"], (*COLUMNS, "--displacement")),
     "measure": (
-        ["--device", "virtual:", "--drive", "sine:1Hz,0..75V", "--rate", "100", "--out", "out.csv"],
-        ("--device", "--drive", "--rate", "--duration", "--rest", "--ramp"),
+        ["sine:1Hz,0..75V", "--device", "virtual:", "--rate", "100", "--out", "out.csv"],
+        ("--device", "--rate", "--duration", "--rest", "--ramp"),
     ),
     "play": (
-        ["controller.json", "--device", "virtual:"],
+        ["controller.json", "REFERENCE", "--device", "virtual:"],
         ("--device", "--rate", "--duration", "--period", "--rest"),
     ),
     # With a port that there is not: else it would go on until it is stopped.
     "serve": (
         ["gcs", "--port", "65536"],
-        ("--model", "--limits", "--speed", "--host", "--prefix", "--device"),
+        ("--limits", "--speed", "--host", "--prefix", "--device"),
     ),
 }  # fmt: skip
 # Their shares: those that identify take long.
@@ -190,13 +192,9 @@ def invocations(draw: Any, right: list[str]) -> tuple[list[str], dict[str, str]]
     }
     arguments = [
         command,
-        *(draw(st.sampled_from(REFERENCES)) if a == "REFERENCE" else a for a in given),
+        *(draw(st.sampled_from(POSITIONAL[a])) if a in POSITIONAL else a for a in given),
     ]
     chosen = draw(st.lists(st.sampled_from(options), max_size=3, unique=True))
-    if command == "track" and "--reference" not in chosen:
-        arguments += [REFERENCES[0]]
-    if command == "contour" and "--path" not in chosen:
-        arguments += [PATHS[0]]
     for option in chosen:
         arguments += [option, draw(st.sampled_from(OPTIONS[option]))]
     # These write nothing. Others would not be asked any more after they have succeeded once.

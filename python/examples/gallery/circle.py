@@ -15,4 +15,8 @@ loops = [pt.Controller.of(axis, feedback=pt.Pid.from_um(kp=0.03, ti=0.02)) for a
 middle = pt.control.workspace(stage, [loop.limits for loop in loops]).centre
 run = pt.contour(stage, loops, pt.circle(frequency=1.0, radius=10e-6, centre=middle))
 print(run.summary())
+
+# %%
+# The path, and the contour error magnified along it and over the angle.
+
 run.plot()

@@ -20,4 +20,9 @@ line = pt.triangle(frequency=20.0, low=10e-6, high=50e-6, duration=0.2, rounding
 loop = pt.Controller.of(fit, limits=(0.0, 75.0))
 found = pt.learn(stage, line, loop, model=fit, cutoff=200.0)
 print(found.summary())
+
+# %%
+# The error of the first and of the best trial, the voltage that was learnt, and the error of all
+# trials.
+
 found.plot()

@@ -11,4 +11,8 @@ import piezotrack as pt
 log = pt.datasets.dbo_training()
 fit = pt.identify(log[3.0:8.0], "prandtl-ishlinskii")
 print(pt.identification.residual_of(fit))
+
+# %%
+# Of white residuals the last panel, the autocorrelation, would stay within its lines.
+
 fit.plot_residual()

@@ -2,7 +2,7 @@
 With and without feedback
 =========================
 
-A triangle of 37 um: with the inverse of the model alone, whose error is a constant offset for the
+A triangle of 37 µm: with the inverse of the model alone, whose error is a constant offset for the
 most part, and with a PI feedback as well.
 """
 
@@ -20,6 +20,10 @@ loops = {
     "feedforward": pt.Controller.of(fit),
     "feedforward and PI": pt.Controller.of(fit, feedback=feedback),
 }
+
+# %%
+# The error of each, over time.
+
 fig, ax = plt.subplots(figsize=(8, 3.5), layout="constrained")
 for name, loop in loops.items():
     run = pt.track(stage, loop, triangle)

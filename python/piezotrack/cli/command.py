@@ -25,7 +25,7 @@ import click
 from ..errors import ParameterError
 from .error_messages import report_errors
 from .help_page import coloured_help, help_page
-from .values import PLAIN, Names, ParamType, Whole
+from .values import PLAIN, Names, ParamType, Quantity, Whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -199,7 +199,8 @@ def _click(name: str, hint: Any, default: Any) -> click.Parameter:
     text = said.help
     if not (required or many or default is None or "default" in text):
         shown = f"{default:g}" if isinstance(default, float) else default
-        text += f"; default {'none' if shown == 'inf' else shown}"
+        unit = kind.bare if isinstance(kind, Quantity) and default else ""
+        text += f"; default {'none' if shown == 'inf' else f'{shown} {unit}'.rstrip()}"
     return click.Option(
         [name, *names],
         help=text,

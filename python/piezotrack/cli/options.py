@@ -94,13 +94,15 @@ Limits = Annotated[
         Ranged(DRIVE, "LOW:HIGH"),
     ),
 ]
-Duration = Annotated[float | None, Option("Length of the motion; default as it says", TIME)]
+Duration = Annotated[
+    float | None, Option("Length of the motion; default that of its text or file", TIME)
+]
 Period = Annotated[
     float | None, Option("Time after which a motion from a file repeats; default never", TIME)
 ]
 Noise = Annotated[float, Option("Noise of the simulated sensor, rms, as 20nm", LENGTH)]
 Bandwidth = Annotated[float, Option("Bandwidth of the simulated amplifier", FREQUENCY)]
-Delay = Annotated[float, Option("Delay of the loop beside the hold", LOOP_TIME)]
+Delay = Annotated[float, Option("Delay of the loop in addition to the hold", LOOP_TIME)]
 Overwrite = Annotated[bool, Option("Replace results that exist")]
 Seed = Annotated[int, Option("Seed of the random numbers")]
 Sensitivity = Annotated[float, Option("Largest sensitivity Ms")]
@@ -118,7 +120,7 @@ OnDevice = Annotated[
     str | None, Option("Device in place of the simulated stage, as of `measure`", metavar="ADDRESS")
 ]
 Rest = Annotated[
-    float | None, Option("Drive before and after; default 0 V, or the limit next to it", VOLTAGE)
+    float | None, Option("Drive before and after; default 0 V, or the limit nearest to it", VOLTAGE)
 ]
 
 

@@ -24,20 +24,8 @@ __all__ = ["Output", "Printing", "can_be_folder", "print_words", "wrapped"]
 # Lines that a command prints at most without -v.
 MOST_LINES = 25
 # Endings by which --out is a file.
-ENDINGS = (
-    *(
-        ".csv",
-        ".npz",
-        ".mat",
-        ".parquet",
-        ".json",
-        ".png",
-        ".svg",
-        ".pdf",
-        ".html",
-        ".xlsx",
-        ".txt",
-    ),
+ENDINGS = re.compile(
+    r"\.(csv|npz|mat|parquet|json|png|svg|pdf|html|xlsx?|txt|docx?|h5|tdms|jpe?g|tiff?|eps|md|c|py)"
 )
 
 # Columns that lines have at most and at least where they are wrapped, and what is before a note.
@@ -112,7 +100,7 @@ class Output(Printing):
     @property
     def is_file(self) -> bool:
         """Whether one file is to be written."""
-        return self.out.suffix.lower() in ENDINGS and not self.out.is_dir()
+        return ENDINGS.fullmatch(self.out.suffix.lower()) is not None and not self.out.is_dir()
 
     @property
     def folder(self) -> Path:

@@ -163,7 +163,8 @@ GAIN = Quantity(
 SLEW = Quantity("SLEW", "as 2000V/s", "V/s", {"V/s": 1.0, "V/ms": 1e3, "kV/s": 1e3})
 DECIBELS = Quantity("DECIBELS", "as 6dB", "dB", {"dB": 1.0})
 DEGREES = Quantity("DEGREES", "as 30deg", "deg", {"deg": 1.0, "\N{DEGREE SIGN}": 1.0})
-PLAIN = Quantity("NUMBER", "as 0.5", "1")
+# Its numbers have no unit, and the blank stands for that.
+PLAIN = Quantity("NUMBER", "as 0.5", " ")
 PERCENT = Quantity("PERCENT", "as 5%", "%", {"%": 1.0})
 DRIVE = Quantity(
     "DRIVE",

@@ -265,7 +265,12 @@ class Log:
         """
         try:
             return self._roles(wanted, units, dt)
-        except DataError:
+        except DataError as error:
+            if (above := self.table.above()) is not None:
+                hint = (
+                    f"; the titles seem to be in line {above + 1}: skip={above} leaves out the rest"
+                )
+                raise DataError(f"{error}{hint}") from None
             empty = {column.index for column in self.columns if self.table.is_empty(column)}
             if not empty or empty == self.columns.empty:
                 raise

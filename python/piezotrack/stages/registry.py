@@ -44,7 +44,7 @@ def model_named(name: object) -> ModelInfo:
         if isinstance(name, str) and model.name == name:
             return model
     if (near := _meant(name)) is not None:
-        raise ParameterError("model", quoted(name), f"the name of one. Did you mean {near!r}?")
+        raise ParameterError("model", quoted(name), f"the name of one (did you mean {near!r}?)")
     expected = ", ".join(repr(model.name) for model in MODELS)
     raise ParameterError("model", quoted(name), f"one of {expected}")
 

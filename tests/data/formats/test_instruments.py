@@ -138,7 +138,7 @@ def test_lines_above_the_titles_are_skipped(tmp_path: Path, mark: str) -> None:
     path = tmp_path / "log.csv"
     text = "Setup 7, amplifier A\nrange,high\ntime_s,voltage_V,x_um\n" + rows(T, U, Y)
     path.write_text(text.replace("\n", mark), encoding="utf-8", newline="")
-    refusal(path)
+    assert "skip=2" in refusal(path)
     assert is_the_log(pt.read(path, skip=2), tolerance=1e-7)
     assert pt.data.info(path, skip=2).problem == ""
     assert np.abs(pt.data.read_drive(path, skip=2).u - U).max() < 1e-7

@@ -344,7 +344,7 @@ def test_a_worker_of_another_version_is_refused() -> None:
         (([log()], ["dahl", "dahl"]), "models has 'dahl' twice"),
         (([log()], [["dahl"]]), r"models has \['dahl'\]: expected names of models, or a mapping"),
         (([log()], {"a": QUICK, "b": QUICK}), "models has the same settings as 'a' and as 'b'"),
-        (([log()], ["dalh"]), "models: 'dalh': model is 'dalh': .*Did you mean 'dahl'"),
+        (([log()], ["dalh"]), "models: 'dalh': model is 'dalh': .*did you mean 'dahl'"),
         (([log()], {"mine": {}}), "models: 'mine': model is 'mine': expected one of 'dahl'"),
         (([log()], {"mine": 3}), r"models\['mine'\] is 3: expected arguments of identify"),
         (([log()], {"dahl": {"method": pt.Descents(seed=3)}}), "seed 3: expected it in seeds="),

@@ -68,6 +68,7 @@ def feedforward_command(
                 *(samples.t, voltage, samples.x),
                 title=f"feedforward ({known.model.info.title}) for {desired.name}",
                 drive_unit=known.drive_unit,
+                limits=volts,
             )
             written = [write_columns(folder / "feedforward.csv", table)]
             return written + save_figures({"feedforward": picture}, folder)

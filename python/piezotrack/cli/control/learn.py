@@ -59,7 +59,8 @@ def learn_command(
     mode_scales: Annotated[
         str,
         Option(
-            "Factors on the model's resonances with which learning converges", metavar="A,B,..."
+            "Factors on the model's resonances for which learning has to converge",
+            metavar="A,B,...",
         ),
     ] = "0.9,1,1.1",
     zero: Zero = False,

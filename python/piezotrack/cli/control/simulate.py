@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from ...errors import ParameterError
+from ...errors import DataError, ParameterError
 from ..command import Argument, Option, command
 from ..option_groups import DriveColumns
 from ..options import ModelFile, of_file
 from ..output import Output
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
 
 __all__ = ["simulate_command"]
 
@@ -63,6 +69,7 @@ def simulate_command(
                 *(t, u, x),
                 title=f"{known.model.info.title} driven by {log.name}",
                 drive_unit=known.drive_unit,
+                measured=_measured(log, columns, x),
             )
             written = [write_columns(folder / "simulated.csv", table)]
             return written + save_figures({"simulated": picture}, folder)
@@ -82,3 +89,15 @@ def simulate_command(
     }
     notes = [f"note  {remark}" for remark in remarks]
     output.show("\n".join([words, *notes]), document, output.write(save))
+
+
+def _measured(log: Path, columns: DriveColumns, x: Array) -> Array | None:
+    """Return the displacement of a log that has one [m], its mean that of the simulated one."""
+    from ...data.reader import read
+
+    try:
+        y = read(log, **columns.arguments).y
+    except DataError:
+        return None
+    shifted: Array = y - y.mean() + x.mean()
+    return shifted

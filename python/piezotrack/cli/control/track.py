@@ -100,7 +100,7 @@ def track_command(
         _simulate(output, plant, ready, desired, timing, free, known, name, stage, begun)
         return
     if not (loop.feedforward or repetitive or loop.has_feedback(own=own)):
-        raise ParameterError("--no-feedforward: expected --kp and --ti, or nothing moves the stage")
+        raise ParameterError("--no-feedforward: expected --kp and --ti, or the drive is constant")
     known = known_model(model, zero=zero, paper=not own)
     playback: Literal["table", "online"] = "online" if online else "table"
     made = Controller(
@@ -196,7 +196,7 @@ def _on_device(
 
             def write(run: Tracking) -> str:
                 table, *_ = run.save(output.folder, entries={"notes": [ended]})
-                return f"what was tracked up to then is in {table.parent}"
+                return f"the run up to then is in {table.parent}"
 
             raise with_what_is_kept(error, "tracked", write) from None
     output.show(run.summary(), run.document(), output.write(run.save))

@@ -68,7 +68,7 @@ def campaign_command(
     ] = Path("campaign"),
     printing: Printing,
 ) -> None:
-    """Identify models of many logs or windows; resumed where it ended."""
+    """Identify models of many logs or windows; a second call continues."""
     from ..._support.files.writing import save_figures
     from ...identification.campaigns.campaign import campaign
     from ...identification.campaigns.result import check_parquet
@@ -76,7 +76,7 @@ def campaign_command(
     kinds = Kinds.checked(model)
     kinds.refuse_without_effect()
     if not any(map(searched, kinds.names)):
-        refuse_without_effect(("seeds",), "with models that least squares find")
+        refuse_without_effect(("seeds",), "with models that are fitted by least squares")
     can_be_folder(out)
     if parquet:
         check_parquet()

@@ -97,10 +97,10 @@ class Kinds:
         """Refuse options that none of the models has."""
         names = ", ".join(self.names)
         if not any(map(searched, self.names)):
-            reason = f"with the model {names}, whose parameters follow by least squares"
+            reason = f"with the model {names}, which is fitted by least squares"
             refuse_without_effect(RUNNING, reason)
         if not any(map(_of_plays, self.names)):
-            reason = f"with the model {names}, whose parameters are searched"
+            reason = f"with the model {names}, which is fitted by a search"
             refuse_without_effect(OF_PLAYS, reason)
         if given("fix") and self.names == (AUTO,):
             refuse_without_effect(OF_PLAYS, "with --fix, for which a search is needed")
@@ -117,7 +117,7 @@ class Kinds:
                 if not set(fixed) <= {"stiffness"}:
                     refuse_without_effect(("fix",), reason)
             elif not searched(name):
-                reason = f"with the model {name}, whose parameters follow by least squares"
+                reason = f"with the model {name}, which is fitted by least squares"
                 refuse_without_effect(OF_SEARCH, reason)
 
 
@@ -421,7 +421,9 @@ def _creep(text: str | None) -> bool | list[float] | None:
 
 
 def _time(option: str, text: str, expected: str) -> float:
+    # A delay may be meant in ms, a time constant of drift hardly.
+    quantity = LOOP_TIME if option == "--sensor-delay" else TIME
     try:
-        return LOOP_TIME.parse(option, text) if option == "--sensor-delay" else TIME.parse(option, text)
+        return quantity.parse(option, text)
     except ParameterError:
         raise ParameterError(option, f"'{text}'", expected, verb="has") from None

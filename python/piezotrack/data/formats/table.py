@@ -155,6 +155,10 @@ class Table(ABC):
             # One that cannot be read is not known to be empty.
             return False
 
+    def above(self) -> int | None:
+        """Return how many lines seem to be above the titles, where those found seem to be none."""
+        return None
+
     def interval(self, main: Sequence[Column]) -> float | None:
         """Return the sampling interval that the file states for columns [s], or None."""
         del main

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..._support.display.plot_style import (
     GUIDE,
+    LEVEL,
     MODELS,
     caption,
     drawing,
     heading,
     is_narrow,
+    legend_inside,
     literal,
     names_beside,
     sheet,
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
 __all__ = ["plot_campaign"]
 
 MARKERS = "osD^vP"
+# Records of one model that are listed by their names; more are drawn along an axis.
+LISTED = 6
 # Records that are named beside their lines; more are numbered.
 NAMED = 40
 # A cost this far above the lowest is drawn, in per cent; a seed without a difference is put here.
@@ -37,21 +42,10 @@ EQUAL = 1e-3
 
 @drawing
 def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> Figure:
-    """Draw the costs of a campaign.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The results.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Draw the costs of a campaign."""
     several = any(len(group) > 1 for group in campaign.groups.values())
+    if not several and len(campaign.models) == 1 and len(campaign.records) > LISTED:
+        return _along(campaign, fig)
     height = 2.3 + min(0.35 * len(campaign.records), 9.0)
     names = ("costs", "apart") if several else ("costs",)
     least = 1.0 + min(0.2 * len(campaign.records), 6.0)
@@ -70,6 +64,26 @@ def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> 
         figure.legend(
             handles, labels, loc="outside lower center", ncols=3, fontsize="small", frameon=False
         )
+    return whole(figure)
+
+
+def _along(campaign: Campaign, fig: Figure | SubFigure | None) -> Figure:
+    """Draw the rms of one model over the records, in the order given."""
+    figure, axes = sheet(fig, (7.5, 3.6), (("costs",),), least=1.9)
+    ax, (model,) = axes["costs"], campaign.models
+    rms = [math.nan if one.error is not None else one.rms_percent for one in campaign]
+    places = np.arange(1.0, len(rms) + 1.0)
+    ax.plot(places, rms, **{**_style(campaign, model), "linestyle": "-", "linewidth": 0.8})
+    if campaign.failed:
+        lost = [place for place, one in zip(places, rms, strict=True) if math.isnan(one)]
+        ax.plot(lost, [0.0] * len(lost), "x", color="black", label="no model found", clip_on=False)
+    median = float(np.nanmedian(rms)) if np.isfinite(rms).any() else 0.0
+    ax.axhline(median, **LEVEL, label=f"median {median:.3g} %")
+    ax.set(xlabel="record, in the order given", ylabel="rms error [% of stroke]")
+    ax.set_ylim(bottom=0.0)
+    ax.locator_params(axis="x", integer=True)
+    legend_inside(ax)
+    caption(figure, f"{literal(model)}: {size_of(campaign)}")
     return whole(figure)
 
 

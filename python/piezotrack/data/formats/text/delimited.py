@@ -43,6 +43,8 @@ __all__ = ["FORMAT", "Layout", "TextTable", "lines_of"]
 
 # A line beyond this is none of a log.
 MOST_LETTERS = 1_000_000
+# Lines above titles at most.
+MOST_ABOVE = 200
 CUT_OFF = "; the log may have been cut off in this last line"
 # Samples before a last one without its line end that it is compared with: at least, and at most.
 LEAST_BEFORE, MOST_BEFORE = 10, 1000
@@ -233,6 +235,16 @@ class TextTable(Table):
     def column(self, column: Column) -> Array:
         """Read one column; what is not a number is NaN."""
         return self.all_columns()[:, column.index]
+
+    def above(self) -> int | None:
+        """Return the number of lines above titles further down, with samples right below them."""
+        lines = self.layout.lines[: MOST_ABOVE + 1]
+        for k in range(self.layout.first, len(lines) - 1):
+            delimiter = delimiter_of(lines[k])
+            titles, below = (split_fields(line, delimiter) for line in lines[k : k + 2])
+            if 1 < len(titles) == len(below) and are_titles(titles) and not are_titles(below):
+                return k
+        return None
 
     def is_empty(self, column: Column) -> bool:
         """Whether there is no reading in any line."""

@@ -36,6 +36,7 @@ from commands import (
 )
 from piezotrack.cli.commands import app
 from piezotrack.data.log_file import write_log
+from piezotrack.identification.views import plot as views
 from records import BOX, HELD, quick
 
 
@@ -226,6 +227,25 @@ def test_simulate_writes_the_displacement() -> None:
     assert np.allclose(back.y, x, rtol=1e-9, atol=1e-15)
     found = re.search(r"from (\S+) to (\S+) um", printed)
     assert found is not None
+
+
+def test_simulate_draws_the_displacement_of_a_log_that_has_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drawn: list[Any] = []
+
+    def plot(*signals: Any, measured: Any, **_: Any) -> Figure:
+        drawn.append((signals[2], measured))
+        return Figure()
+
+    monkeypatch.setattr(views, "plot_response", plot)
+    write_model()
+    Path("log.csv").write_text(log_text(), encoding="utf-8")
+    ran("simulate", "dahl.json", "log.csv", "--out", "run")
+    ((x, measured),) = drawn
+    y = pt.read("log.csv").y
+    assert np.allclose(np.diff(measured), np.diff(y), atol=1e-15)
+    assert measured.mean() == pytest.approx(x.mean())
 
 
 @pytest.mark.slow

@@ -78,8 +78,8 @@ def test_a_loop_that_fails_says_where_its_beginning_is(monkeypatch: pytest.Monke
 
     use(monkeypatch, Lost(pt.VirtualStage.of(PLAYS, limits=(0.0, 75.0))))
     motion = "sine:0.2Hz,20..60um,20s"
-    said = refusal("track", "loop.json", "--device", "virtual:", *motion, "--out", "tk")
-    assert "the connection was lost; what was tracked up to then is in tk" in said
+    said = refusal("track", "loop.json", "--device", "virtual:", motion, "--out", "tk")
+    assert "the connection was lost; the run up to then is in tk" in said
     assert names("tk") == ["tracking.csv", "tracking.json", "tracking.png", "tracking.svg"]
 
 

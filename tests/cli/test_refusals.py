@@ -51,7 +51,7 @@ BAD_LOGS: dict[str, tuple[Callable[[], str | bytes], int | None, tuple[str, ...]
     "constant drive": (lambda: column(1, "5"), None, ("drive is constant at 5 V", "expected")),
     "dead sensor": (lambda: column(2, "7"), None, ("displacement is constant", "sensor")),
     "binary": (lambda: bytes(range(256)) * 10, 1, ("is not a text log",)),
-    "an archive": (lambda: b"PK\x03\x04" + bytes(100), 1, ("is not a text log",)),
+    "an archive": (lambda: b"PK\x03\x04" + bytes(100), None, ("is a zip archive", "expected")),
 }
 
 
@@ -145,8 +145,8 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
         "least squares",
     ),
     "identify log.csv --model prandtl-ishlinskii --drift 0": ("drift is 0", "above 0"),
-    "identify log.csv --model PI": ("model is 'PI'", "Did you mean 'prandtl-ishlinskii'?"),
-    "identify log.csv --model Bouc_Wen": ("Did you mean 'bouc-wen'?",),
+    "identify log.csv --model PI": ("model is 'PI'", "did you mean 'prandtl-ishlinskii'?"),
+    "identify log.csv --model Bouc_Wen": ("did you mean 'bouc-wen'?",),
     "identify log.csv --plays 33": ("--plays is 33", "1 to 32 plays"),
     "identify log.csv --asymmetry 9": ("--asymmetry is 9", "up to 8"),
     "identify log.csv --model generalised-prandtl-ishlinskii --asymmetry 2": ("--asymmetry is 2",),
