@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import cache
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -11,8 +12,9 @@ import numpy as np
 import piezotrack as pt
 from campaigns import QUICK
 from piezotrack.cli.research.loop_plot import plot_before_and_after
+from piezotrack.control.on_device.closed_loop import DeviceTracking
+from piezotrack.control.on_device.latency import latency_of
 from piezotrack.control.views.tracking_plot import plot_feedforward
-from piezotrack.hardware.virtual import VirtualDevice
 from piezotrack.identification.views.plot import plot_response
 from watched_records import model_watched, watched
 
@@ -99,9 +101,13 @@ def windows() -> pt.identification.Campaign:
         return pt.campaign(records, {"plays": {"model": "prandtl-ishlinskii"}}, folder=folder)
 
 
-def on_device() -> Any:
+def on_device() -> DeviceTracking:
+    """As on a device that begins far from the reference, without waiting for its clock."""
     reference = pt.sine(frequency=1.0, low=20e-6, high=40e-6, duration=2.0)
-    return pt.track(VirtualDevice(stage()), loop(), reference, beyond_reach=True)
+    run = pt.track(stage(), loop(), reference, beyond_reach=True)
+    late = np.full(run.t.size, 1e-4)
+    values = {one.name: getattr(run, one.name) for one in fields(run)}
+    return DeviceTracking(**values, latency=latency_of(late), lateness=late)
 
 
 def tuned() -> pt.control.Tuned:

@@ -157,6 +157,9 @@ def figure_style(
 def drawing(view: Callable[P, R]) -> Callable[P, R]:
     """Let a function that draws take ``style`` and ``width`` too, and fit what it has drawn.
 
+    It takes an object and where to draw, a figure `fig` or axes `ax`, which are new ones where
+    None, and returns that.
+
     Parameters
     ----------
     view : callable

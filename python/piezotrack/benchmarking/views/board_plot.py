@@ -42,20 +42,7 @@ OTHERS: tuple[dict[str, Any], ...] = (
 
 @drawing
 def plot_board(board: Benchmark, fig: Figure | SubFigure | None = None) -> Figure:
-    """Draw the rms of each model on each part of each record.
-
-    Parameters
-    ----------
-    board : Benchmark
-        The results.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Draw the rms of each model on each part of each record."""
     tables = [[row for row in board.of(name) if row.parts] for name in board.records]
     tables = [rows for rows in tables if rows]
     columns = min(COLUMNS, max(1, len(tables)))

@@ -44,20 +44,7 @@ STYLES: tuple[dict[str, Any], ...] = (
 def plot_before_and_after(
     runs: Mapping[str, Tracking], fig: Figure | SubFigure | None = None
 ) -> Figure:
-    """Draw actual over desired displacement of the first and the last run, and all errors.
-
-    Parameters
-    ----------
-    runs : mapping of str to Tracking
-        Three runs along the same reference, by what compensates the hysteresis.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Figure to draw in; default a new one.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Draw actual over desired displacement of the first and the last run, and all errors."""
     rows = (("before", "after"), ("error", "error"))
     figure, axes = sheet(fig, (10.0, 7.4), rows, heights=(1.7, 1.0))
     names = list(runs)

@@ -34,20 +34,7 @@ __all__ = ["plot_learning"]
 
 @drawing
 def plot_learning(learning: Learning, fig: Figure | SubFigure | None = None) -> Figure:
-    """Plot errors of the first and the best trial, their tables, and the error of all trials.
-
-    Parameters
-    ----------
-    learning : Learning
-        The learning.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Plot errors of the first and the best trial, their tables, and the error of all trials."""
     figure, axes = sheet(fig, (7.2, 7.4), (("error",), ("table",), ("history",)))
     controller, t = learning.learner.controller, learning.learner.t
     for run, style, words in (

@@ -34,20 +34,7 @@ LOWEST = 1e-4
 
 @drawing
 def plot_loop_report(report: LoopReport, fig: Figure | SubFigure | None = None) -> Figure:
-    """Plot open loop, sensitivity and, with a repetitive part, the error left by a period.
-
-    Parameters
-    ----------
-    report : LoopReport
-        The report.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Plot open loop, sensitivity and, with a repetitive part, the error left by a period."""
     curves = report.response()
     f = curves.frequency
     figure, axes = sheet(fig, (7.0, 7.4), (("size",), ("phase",), ("parts",)))

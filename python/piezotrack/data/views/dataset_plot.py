@@ -28,20 +28,7 @@ __all__ = ["plot_dataset"]
 
 @drawing
 def plot_dataset(data: Dataset, fig: Figure | SubFigure | None = None) -> Figure:
-    """Draw drive and displacement over time, and displacement over drive.
-
-    Parameters
-    ----------
-    data : Dataset
-        The record.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Draw drive and displacement over time, and displacement over drive."""
     rows = (("drive", "loop"), ("displacement", "loop"))
     figure, axes = sheet(fig, (11.0, 4.8), rows, widths=(1.35, 1.0), down=True)
     drive, displacement, loop = (axes[name] for name in ("drive", "displacement", "loop"))

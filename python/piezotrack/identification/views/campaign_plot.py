@@ -42,20 +42,7 @@ EQUAL = 1e-3
 
 @drawing
 def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> Figure:
-    """Draw the costs of a campaign.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        The results.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Draw the costs of a campaign."""
     several = any(len(group) > 1 for group in campaign.groups.values())
     if not several and len(campaign.models) == 1 and len(campaign.records) > LISTED:
         return _along(campaign, fig)

@@ -41,20 +41,7 @@ JUDGED: dict[str, Any] = {"color": "0.35", "edgecolor": "0.2", "label": "not fit
 
 @drawing
 def plot_comparison(comparison: Comparison, fig: Figure | SubFigure | None = None) -> Figure:
-    """Put loops, errors and bars on one sheet.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        The models, compared.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in: a loop and its errors, bars, and the error of each model.
-    """
+    """Put loops, errors and bars on one sheet."""
     rows = comparison.rows
     size = (11.0, max(8.2, 0.9 * len(rows) + 3.0))
     if is_narrow(fig, size):

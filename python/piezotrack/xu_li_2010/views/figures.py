@@ -181,20 +181,7 @@ def _drives(drives: Drives) -> Figure:
 
 @drawing
 def plot_reproduction(reproduction: Reproduction, fig: Figure | SubFigure | None = None) -> Figure:
-    """Draw obtained over published of every number, with quartiles, in the order of the paper.
-
-    Parameters
-    ----------
-    reproduction : Reproduction
-        The numbers.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Draw obtained over published of every number, with quartiles, in the order of the paper."""
     rows = reproduction.obtained
     figure = panels(fig, (11.0, 5.0))
     ax = figure.subplots()
@@ -210,7 +197,11 @@ def plot_reproduction(reproduction: Reproduction, fig: Figure | SubFigure | None
     missed = {**MARKS, "markersize": 5.0, "marker": "x", "label": "not reached"}
     ax.plot(places[~reached], ratios[~reached], **missed)
     figures = [row.observable.figure for row in rows]
-    first = [i for i, name in enumerate(figures) if i == 0 or name != figures[i - 1]]
+    # As many names as have room beside each other.
+    apart, first = 0.14 * len(rows) / (whole(figure).get_figwidth() - 0.8), [0]
+    for i, name in enumerate(figures):
+        if name != figures[i - 1] and i - first[-1] >= apart:
+            first.append(i)
     ax.set_xticks(first, [figures[i] for i in first], rotation=90, fontsize="small")
     ax.set(xlabel="figure or table of the paper", ylabel="obtained / published")
     ax.margins(x=0.01)

@@ -33,20 +33,7 @@ __all__ = ["plot_table_2"]
 
 @drawing
 def plot_table_2(table: Table2, fig: Figure | SubFigure | None = None) -> Figure:
-    """Plot the circles at 0.1 Hz, their errors over an angle, and published and obtained values.
-
-    Parameters
-    ----------
-    table : Table2
-        The nine circles, run.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Plot the circles at 0.1 Hz, their errors over an angle, and published and obtained values."""
     rows = (3 * ("circles",) + 3 * ("angle",), [one for one in ("max", "mean", "SD") for _ in "12"])
     figure, axes = sheet(fig, (11.0, 8.4), rows, heights=(1.5, 1.0))
     circles = axes["circles"]

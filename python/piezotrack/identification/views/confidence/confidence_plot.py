@@ -36,20 +36,7 @@ BINS, POINTS = 24, 400
 
 @drawing
 def plot_confidence(confidence: Confidence, fig: Figure | SubFigure | None = None) -> Figure:
-    """Draw the rise of the cost along each parameter, or the distribution of its refits.
-
-    Parameters
-    ----------
-    confidence : Confidence
-        The intervals.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in, with a panel for each parameter.
-    """
+    """Draw the rise of the cost along each parameter, or the distribution of its refits."""
     each = confidence.parameters
     across = min(ACROSS, max(len(each), 1))
     names = [*each, *("." for _ in range(-len(each) % across))]

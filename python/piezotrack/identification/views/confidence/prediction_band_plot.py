@@ -38,21 +38,7 @@ __all__ = ["plot_band"]
 
 @drawing
 def plot_band(band: PredictionBand, fig: Figure | SubFigure | None = None) -> Figure:
-    """Draw a prediction with its band.
-
-    Parameters
-    ----------
-    band : PredictionBand
-        The prediction.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in, with the loop, the displacement, and the errors with the parts of the
-        band.
-    """
+    """Draw a prediction with its band."""
     rows = (("loop", "time"), ("loop", "parts"))
     figure, axes = sheet(fig, (11.0, 5.6), rows, widths=(1.0, 1.35))
     _loop(band, axes["loop"])

@@ -53,20 +53,7 @@ def plot_fit_residual(
 
 @drawing
 def plot_residual(residual: Residual, fig: Figure | SubFigure | None = None) -> Figure:
-    """Draw a residual against time, drive, rate and amplitude, its spectrum and autocorrelation.
-
-    Parameters
-    ----------
-    residual : Residual
-        The residual.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Draw a residual against time, drive, rate and amplitude, its spectrum and autocorrelation."""
     rows = (("time", "drive", "rate"), ("amplitude", "spectrum", "correlation"))
     figure, axes = sheet(fig, (12.0, 7.2), rows)
     data, kept = residual.data, residual.kept

@@ -31,20 +31,7 @@ __all__ = ["plot_suggested"]
 
 @drawing
 def plot_suggested(drive: SuggestedDrive, fig: Figure | SubFigure | None = None) -> Figure:
-    """Plot a suggested drive, and the expected deviation of each parameter beside those of others.
-
-    Parameters
-    ----------
-    drive : SuggestedDrive
-        The drive.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Plot a suggested drive, and the expected deviation of each parameter beside others."""
     names = list(drive.parameters)
     size = (11.0, max(4.4, 1.4 + 0.28 * len(names)))
     figure, axes = sheet(

@@ -30,20 +30,7 @@ __all__ = ["plot_noise"]
 
 @drawing
 def plot_noise(noise: Noise, fig: Figure | SubFigure | None = None) -> Figure:
-    """Plot a record at rest: the beginning of it with its steps, and its spectrum.
-
-    Parameters
-    ----------
-    noise : Noise
-        What was found.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Plot a record at rest: the beginning of it with its steps, and its spectrum."""
     figure, axes = sheet(fig, (11.0, 4.4), (("rest", "spectrum"),))
     left, right = axes["rest"], axes["spectrum"]
     data = noise.data

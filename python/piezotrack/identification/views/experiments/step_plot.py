@@ -37,25 +37,7 @@ MARGIN = 0.06
 
 @drawing
 def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
-    """Draw the displacement after the step, with the peaks and the level it ends at.
-
-    Parameters
-    ----------
-    step : StepResult
-        Result of a step response.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes drawn on.
-
-    Raises
-    ------
-    ParameterError
-        The readings were entered by hand.
-    """
+    """Draw the displacement after the step, with the peaks and the level it ends at."""
     trace, (ax,) = _trace(step), axes_or_new(ax, 1)
     read = step.readings
     unit, scale = best_length_unit(max(abs(peak) for peak in read.peaks))
@@ -95,25 +77,7 @@ def plot_step(step: StepResult, ax: Axes | None = None) -> Axes:
 
 @drawing
 def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
-    """Draw the gain over the frequency, with the resonance and the static gain.
-
-    Parameters
-    ----------
-    step : StepResult
-        Result of a step response.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes drawn on.
-
-    Raises
-    ------
-    ParameterError
-        The readings were entered by hand.
-    """
+    """Draw the gain over the frequency, with the resonance and the static gain."""
     trace, (ax,) = _trace(step), axes_or_new(ax, 1)
     read = step.readings
     unit, scale = best_length_unit(abs(read.steady_state))
@@ -161,25 +125,7 @@ def plot_spectrum(step: StepResult, ax: Axes | None = None) -> Axes:
 
 @drawing
 def plot_step_result(step: StepResult, fig: Figure | SubFigure | None = None) -> Figure:
-    """Put step and spectrum on one sheet.
-
-    Parameters
-    ----------
-    step : StepResult
-        Result of a step response.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-
-    Raises
-    ------
-    ParameterError
-        The readings were entered by hand.
-    """
+    """Put step and spectrum on one sheet."""
     _trace(step)
     figure, axes = sheet(fig, (11.0, 4.4), (("step", "spectrum"),))
     plot_step(step, axes["step"])

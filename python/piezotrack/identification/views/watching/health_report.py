@@ -80,20 +80,7 @@ def _row(change: Change) -> str:
 
 @drawing
 def plot_health(health: Health, fig: Figure | SubFigure | None = None) -> Figure:
-    """Draw each change with its interval, in half widths of the interval.
-
-    Parameters
-    ----------
-    health : Health
-        The verdicts.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Draw each change with its interval, in half widths of the interval."""
     figure, axes = sheet(fig, (7.5, 4.0), (("changes",),), least=2.2)
     ax = axes["changes"]
     for i, change in enumerate(health.changes):
