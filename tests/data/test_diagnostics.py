@@ -77,7 +77,7 @@ def test_nothing_is_said_of_measured_logs() -> None:
     fit = pt.identify(
         pt.read(MEASURED / "training.csv")[3.0:23.0], "dahl", method=pt.Descents(seed=1)
     )
-    assert re.match(r"a lag of .* ms makes .* of the travel at this rate", fit.notes[0])
+    assert re.match(r"the lag of .* ms contributes .* of the travel at this rate", fit.notes[0])
 
 
 # Refusals.

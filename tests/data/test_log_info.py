@@ -328,7 +328,7 @@ def test_no_model_where_the_displacement_does_not_follow(tmp_path: Path) -> None
     ):
         report = pt.data.info(pt.Dataset(u=drive, y=moved, dt=DT).save(tmp_path / "log.npz"))
         assert note in report.notes[0]
-        assert determined(report).startswith("no model before")
+        assert determined(report).startswith("no model: drive")
         assert len(report.determines) == 1
     # A line up is followed, although it has no correlation but for its slope.
     ramp = np.linspace(0.0, 10.0, 5000)

@@ -212,7 +212,7 @@ def test_a_gain_margin_out_of_reach_is_named_with_the_nearest() -> None:
     """The search itself ranks unstable gains before those that are short by so much."""
     message = refusal("tune", "dahl.json", *QUICK, "--gain-margin", "180")
     assert message.startswith("--gain-margin is 180 dB, a factor of 1e+09: expected one that some")
-    (nearest,) = re.findall(r"the nearest have ([0-9.]+) dB \(", message)
+    (nearest,) = re.findall(r"the nearest gains reach ([0-9.]+) dB \(", message)
     (less,) = re.findall(r", ([0-9.]+) dB too low$", message)
     assert float(nearest) + float(less) == pytest.approx(180.0, rel=1e-3)
     # What is said to be nearest can be kept, and not much more.

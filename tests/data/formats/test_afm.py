@@ -130,7 +130,7 @@ def test_an_archive_that_expands_beyond_measure_is_refused(tmp_path: Path) -> No
     path = jpk(tmp_path / "curve.jpk-force")
     with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("segments/0/channels/vDeflection.dat", bytes(110_000_000))
-    assert "said to have 110000000 bytes" in refusal(path)
+    assert "declares 110000000 bytes" in refusal(path)
 
 
 def test_a_file_that_was_refused_is_read_when_it_is_whole(tmp_path: Path) -> None:

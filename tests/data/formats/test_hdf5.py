@@ -48,10 +48,7 @@ def test_another_unit_than_that_of_the_file_is_said(tmp_path: Path) -> None:
     log = pt.read(path, units={"displacement": "nm"})
     assert np.abs(log.y - 1e-9 * Y).max() < 1e-20
     (note,) = log.notes
-    assert note == (
-        "column 'scan 1/run/position' is taken in nm, as units= says, where the file says "
-        "\N{MICRO SIGN}m"
-    )
+    assert note == ("column 'scan 1/run/position': unit nm by units=, \N{MICRO SIGN}m in the file")
     # The same unit in other words is no contradiction.
     assert pt.read(path, units={"drive": "V", "displacement": "um"}).notes == ()
 

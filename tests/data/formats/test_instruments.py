@@ -79,7 +79,7 @@ def test_a_capture_is_read_with_the_units_of_the_file(
     log = pt.read(path, **given)
     assert is_the_log(log, tolerance=1e-7)
     assert log.drive_unit == "V"
-    assert any("as units= says, where the file says V" in note for note in log.notes)
+    assert any("by units=, V in the file" in note for note in log.notes)
     assert pt.data.info(path, **given).format == "oscilloscope"
 
 

@@ -125,7 +125,7 @@ def test_a_file_that_lies_about_its_sizes_is_refused(tmp_path: Path, lie: str) -
     path = tmp_path / "log.mat"
     path.write_bytes(MAT_HEADER + LIES[lie])
     found = refusal(path)
-    assert "said to have" in found
+    assert "declares" in found
     assert "expected" in found
 
 

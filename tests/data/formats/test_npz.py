@@ -111,7 +111,7 @@ def test_an_array_that_lies_about_its_size_is_refused(tmp_path: Path, count: str
     short = npy_header(f"({count},)") + T[:100].tobytes()
     found = refusal(archive(tmp_path / "log.npz", time_s=short))
     assert "array 'time_s'" in found
-    assert f"have {8 * int(count)} bytes: expected 800" in found or "shape (-5,)" in found
+    assert f"declares {8 * int(count)} bytes: expected 800" in found or "shape (-5,)" in found
     (tmp_path / "log.npy").write_bytes(short)
     refusal(tmp_path / "log.npy")
 
