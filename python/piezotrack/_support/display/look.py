@@ -215,7 +215,8 @@ def drawing(view: Callable[P, R]) -> Callable[P, R]:
                 before = parts_of([*args, *options.values(), panel and panel.ax])
                 drawn: Any = view(*args, **options)
                 drawn = panel.ax if panel else drawn
-                fit_in(drawn, before, thin=look().paper)
+                with without_glyph_warnings():
+                    fit_in(drawn, before, thin=look().paper)
         finally:
             _INSIDE.reset(token)
             CHOSEN.reset(chosen)
