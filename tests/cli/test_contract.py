@@ -99,6 +99,7 @@ TABLE = """
 --seeds           N|A:B                                     Seeds of the random numbers
 --sensitivity     NUMBER                                    Largest sensitivity Ms
 --sensor-delay    fit|TIME|LOW:HIGH                         Delay of the sensor
+--skip            N                                         Lines above the titles
 --slew            SLEW                                      Largest rate of the drive
 --speed           NUMBER                                    relative to real time
 --stage           FILE|xu-li-2010                           Stage to simulate

@@ -261,3 +261,28 @@ def test_a_reference_without_header_is_told_what_this_command_can_do() -> None:
     assert "resample" not in refusal("noise", "gap.csv")
     write("gap.csv", "time_s,voltage_V,x_um\n0,1,1\n1,2,1\n2,3,1\n5,3,1\n")
     assert "--resample puts it" in refusal("identify", "gap.csv")
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_a_name_with_an_ending_is_the_one_result_of_that_kind() -> None:
+    ran("simulate", "dahl.json", "drive.csv", "--out", "all")
+    ran("simulate", "dahl.json", "drive.csv", "--out", "one/run.csv")
+    assert names("one") == ["run.csv"]
+    assert Path("one/run.csv").read_bytes() == Path("all/simulated.csv").read_bytes()
+    assert "run.csv exists: expected --overwrite" in refusal(
+        "simulate", "dahl.json", "drive.csv", "--out", "one/run.csv"
+    )
+    said = refusal("simulate", "dahl.json", "drive.csv", "--out", "run.json")
+    assert said.startswith("--out is run.json: expected a folder, or a file ending in .csv")
+
+
+def test_long_results_are_cut_and_whole_with_v() -> None:
+    short = ran("track", "dahl.json", "sine:1Hz,0..9um,60s", "--limits", "0:75", "--dt", "20ms")
+    long = ran(
+        *("track", "dahl.json", "sine:1Hz,0..9um,60s", "--limits", "0:75", "--dt", "20ms"),
+        *("--overwrite", "-v"),
+    )
+    shown = [line for line in short.splitlines() if line]
+    assert len(shown) <= 28 < len(long.splitlines())
+    more = int(re.findall(r"\.\.\. (\d+) more lines with -v", short)[0])
+    assert len(short.splitlines()) - 1 + more == len(long.splitlines())

@@ -13,7 +13,8 @@ log = pt.datasets.dbo_training()
 records = {f"{begin} to {begin + 4} s": log.cut(begin, begin + 4) for begin in (3, 8, 13)}
 models = ["prandtl-ishlinskii", "duhem"]
 found = pt.campaign(records, models, folder=tempfile.mkdtemp())
-print(found.summary())
+for one in found:
+    print(f"{one.record}, {one.model}: {one.rms_percent:.2f} %")
 
 # %%
 # One line for each record, one colour for each model.

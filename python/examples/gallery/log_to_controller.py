@@ -15,7 +15,7 @@ fit = pt.identify(log[3.0:13.0], "asymmetric-prandtl-ishlinskii")
 print("on the other log:", fit.score(other[3.0:]))
 
 # %%
-# The controller: inverse of the model as feedforward, and a PI feedback. Gains in V/um and s.
+# The controller: inverse of the model as feedforward, and a PI feedback. Gains in V/µm and s.
 
 loop = pt.Controller.of(fit, feedback=pt.Pid.from_um(kp=0.03, ti=0.02))
 triangle = pt.triangle(frequency=1.0, low=5e-6, high=42e-6, duration=4.0)
@@ -30,7 +30,7 @@ print(run.metrics)
 run.plot()
 
 # %%
-# On the hardware, one call for each sample: reference and reading in um, voltage out.
+# On the hardware, one call for each sample: reference and reading in µm, voltage out.
 
 session = loop.start()
 print(session.step_um(10.0, 9.8))

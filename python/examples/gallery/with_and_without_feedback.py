@@ -2,7 +2,7 @@
 With and without feedback
 =========================
 
-A triangle of 37 um: with the inverse of the model alone, whose error is a constant offset for the
+A triangle of 37 µm: with the inverse of the model alone, whose error is a constant offset for the
 most part, and with a PI feedback as well.
 """
 

@@ -66,6 +66,9 @@ class _Columns:
     ] = None
     dt: Annotated[float | None, Option("Sampling interval; default by times", LOOP_TIME)] = None
     rate: Rate = None
+    skip: Annotated[
+        int | None, Option("Lines above the titles of the columns; default recognised")
+    ] = None
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -73,7 +76,7 @@ class _Columns:
         units = {column(name) or name: text for name, text in pairs("--unit", self.unit)}
         names = ("time", "drive", "displacement")
         columns = {name: column(getattr(self, name, None)) for name in names}
-        given = {**columns, "units": units, "dt": interval(self.dt, self.rate)}
+        given = {**columns, "units": units, "dt": interval(self.dt, self.rate), "skip": self.skip}
         return {name: value for name, value in given.items() if value not in (None, {})}
 
 

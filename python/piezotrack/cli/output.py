@@ -149,16 +149,19 @@ class Output(Printing):
         list of pathlib.Path
             The files.
         """
-        from .._support.files.writing import make_folder
+        import shutil
+
+        from .._support.files.writing import make_folder, replacing
 
         folder = make_folder(self.folder)
         if not self.is_file:
             return list(save(folder))
-        with TemporaryDirectory(dir=folder, prefix=".piezotrack-") as place:
+        with TemporaryDirectory() as place:
             ending = self.out.suffix.lower()
             found = sorted(save(Path(place)), key=lambda path: path.name != main)
             one = next(path for path in found if path.suffix == ending)
-            one.replace(self.out)
+            with replacing(self.out) as temporary:
+                shutil.copyfile(one, temporary)
         return [self.out]
 
 

@@ -182,3 +182,12 @@ def test_a_campaign_takes_all_windows_and_cuts_others() -> None:
         assert len(spans) == 2
         assert [span.split(" to ")[0] for span in spans] == ["log.csv 0", "log.csv 2"]
     assert "--every is 9 s" in refusal("campaign", "log.csv", "--every", "9s")
+
+
+def test_lines_above_the_titles_are_skipped() -> None:
+    lines = [line for line in log_text().splitlines() if not line.startswith("#")]
+    write("scope.csv", "\n".join(["Maker,model,serial", "made up here", *lines]) + "\n")
+    ran("convert", "scope.csv", "plain.npz", "--skip", "2")
+    assert np.array_equal(pt.read("plain.npz").y, pt.read("log.csv").y)
+    assert "--skip has 'two'" in refusal("info", "scope.csv", "--skip", "two")
+    assert "--skip is -1" in refusal("info", "scope.csv", "--skip", "-1")

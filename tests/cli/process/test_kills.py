@@ -49,10 +49,10 @@ WORK = {
     ],
     "learn": [
         *("learn", "dahl.json", "sine:0.5Hz,10..60um,4s", "--noise", "60nm"),
-        *("--dt", "0.02", "--limits", "0:75", "--trials", "3", "--picture"),
+        *("--dt", "0.02", "--limits", "0:75", "--trials", "3"),
     ],
     "compare-controllers": [
-        *("compare-controllers", "dahl.json", "--controllers", "PID", "--rates", "0.5,1,2"),
+        *("compare-controllers", "dahl.json", "--controllers", "PID", "--frequencies", "0.5,1,2"),
         *("--dt", "0.02", "--limits", "0:75", "--noise", "60nm"),
     ],
     # Each seed is a controller of its own.
@@ -77,12 +77,10 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 def start(work: list[str], out: str, seed: int, *, slowly: bool = False) -> subprocess.Popen[bytes]:
     words = f"{HEADING}; {SLOWLY if slowly else 'pass'}; main()"
-    # A table is given a name, the others write into a folder.
-    written = f"{out}/table.csv" if work[0] == "learn" else out
     drawn = () if work[0] == "export" else ("--seed", str(seed))
     asked = [word.replace("SEED", str(seed)) for word in work]
     return subprocess.Popen(
-        [sys.executable, "-c", words, *asked, "--overwrite", "--out", written, *drawn],
+        [sys.executable, "-c", words, *asked, "--overwrite", "--out", out, *drawn],
         stdout=subprocess.DEVNULL,
     )
 
