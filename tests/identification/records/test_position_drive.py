@@ -102,10 +102,10 @@ def test_no_volt_is_spoken_of(kind: str) -> None:
     fit = pt.identify(height(), kind, method=[pt.Descents(seed=1), pt.LeastSquares()])
     words = [fit.summary(), *fit.extrapolation_notes(3.0 * height().u, 1e-4)]
     assert len(words) == 3
-    assert height().plot().axes[0].get_ylabel() == "drive [um]"
+    assert height().plot().axes[0].get_ylabel() == "drive [\N{MICRO SIGN}m]"
     axes = plot_loop(height(), fit.simulate(height()))
     words += [axes.get_xlabel()]
-    assert axes.get_xlabel() == "drive [um]"
+    assert axes.get_xlabel() == "drive [\N{MICRO SIGN}m]"
     assert np.max(axes.lines[0].get_xdata()) == pytest.approx(40.0, rel=1e-3)
     plt.close("all")
     for text in words:

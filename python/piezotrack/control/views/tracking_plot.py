@@ -22,6 +22,7 @@ from ..._support.display.plot_style import (
     drawing,
     legend_inside,
     literal,
+    share,
     sheet,
     thinned,
     trace,
@@ -202,7 +203,7 @@ def plot_feedforward(
     trace(axes["reference"], t, 1e6 * x, reference, ylabel="reference [um]")
     drive = axes["drive"]
     trace(drive, t, scale * voltage, FEEDFORWARD, steps=True, xlabel="time [s]", ylabel=label)
-    drive.sharex(axes["reference"])
+    share(drive, axes["reference"])
     kept = thinned(voltage)
     axes["over"].plot(1e6 * x[kept], scale * voltage[kept], **FEEDFORWARD)
     axes["over"].set(xlabel="reference [um]", ylabel=label)

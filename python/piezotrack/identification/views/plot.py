@@ -26,6 +26,7 @@ from ..._support.display.plot_style import (
     literal,
     panels,
     plain_log_ticks,
+    share,
     sheet,
     thinned,
     trace,
@@ -346,7 +347,7 @@ def plot_model(
     if fit is not None and searched:
         plot_convergence(fit, axes["convergence"])
     both = axes["time"], axes["error"]
-    both[1].sharex(both[0])
+    share(both[1], both[0])
     plot_time(record, run, both, stroke=model.stroke, half=band_of(model, record))
     title = what_was_shown(model, record, run)
     caption(figure, what_was_fitted(fit) if fit and data is None else title)
@@ -432,7 +433,7 @@ def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
         _, axes = sheet(part, (11.0, 4.6), rows, widths=(1.0, 1.35))
         plot_loop(record.data, run, axes["loop"])
         both = axes["time"], axes["error"]
-        both[1].sharex(both[0])
+        share(both[1], both[0])
         half = band_of(fit, record.data)
         plot_time(record.data, run, both, stroke=record.stroke, half=half)
         caption(part, what_was_fitted(fit, record))
