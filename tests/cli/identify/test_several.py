@@ -107,7 +107,7 @@ def test_a_model_of_several_logs_is_used_like_any_other() -> None:
         "0.02",
     )
     ran("simulate", "results/dahl.json", "b.csv", "--out", "simulated.csv")
-    train = ("--window", "0:2", "--test", "2:4")
+    train = ("--window", "0:2", "--test-window", "2:4")
     ran("identify", "a.csv", *KINDS, *FIXED, "--test", "b.csv", "--out", "one")
     assert "dahl" in ran("compare", "b.csv", "--model", "results/dahl.json", *train).lower()
 

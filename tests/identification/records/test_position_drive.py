@@ -179,7 +179,7 @@ def test_closed_loops_take_it() -> None:
     assert 0.0 <= rows["drive_um"].min() < 20.0 < rows["drive_um"].max() <= 45.0
     late = rows["time_s"] > 2.0
     assert np.abs(rows["desired_um"] - rows["measured_um"])[late].max() < 0.5
-    match = refusal("track", model, *course[:2], "--kp", "900", "--ti", "0.02", "--overwrite")
+    match = refusal("track", model, *course[:3], "--kp", "900", "--ti", "0.02", "--overwrite")
     assert re.search(r"on this stage, [\d.]+ um/um; at the limit kp would be [\d.]+ um/um", match)
     match = refusal("track", model, "sine:1Hz,5..400um", "--overwrite")
     assert re.search(r"which this stage reaches from [\d.]+ to [\d.]+ um", match)
