@@ -396,7 +396,10 @@ REFUSED_COMMANDS: dict[str, tuple[str, ...]] = {
     "compare log.csv --window a:b": ("--window has 'b'", "number"),
     "compare log.csv --window 1:": ("nothing to validate on", "or --test"),
     "compare log.csv --test-window :4": ("nothing to fit", "or --window"),
-    "compare log.csv --window 1:30": ("log.csv: ", "the window from 1 s to 30 s",),
+    "compare log.csv --window 1:30": (
+        "log.csv: ",
+        "the window from 1 s to 30 s",
+    ),
     "compare log.csv --window 1:5 --test-window 4:6": (
         "log.csv: --test-window goes from 4",
         "do not overlap",
