@@ -247,7 +247,7 @@ def _shortened(words: str, brief: str, most: int) -> str:
     for line in brief.split("\n"):
         # What is not a row of a table stays.
         filled += bool(line)
-        if filled <= most or line[:1] not in ("", " "):
+        if filled <= most or line.startswith("  piezotrack ") or line[:1] not in ("", " "):
             lines.append(line)
     more = len(words.split("\n")) - len(lines)
     return "\n".join([*lines, f"... {more} more lines with -v"] if more > 0 else lines)
