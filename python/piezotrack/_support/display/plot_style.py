@@ -307,20 +307,7 @@ def trace(
 ) -> None:
     """Draw a signal over time, thinned, from the first to the last instant.
 
-    Parameters
-    ----------
-    ax : matplotlib.axes.Axes
-        Where to draw.
-    t, values : ndarray, shape (n,)
-        Times, and the signal.
-    style : mapping
-        Of the line.
-    steps : bool, optional
-        Whether each value holds until the next.
-    zero : bool, optional
-        Whether a line is drawn through 0.
-    xlabel, ylabel : str, optional
-        Labels of the axes.
+    With `steps` each value holds until the next; with `zero` a line is drawn through 0.
     """
     kept = thinned(values)
     ax.plot(t[kept], values[kept], drawstyle="steps-post" if steps else "default", **style)
