@@ -48,7 +48,7 @@ def classes() -> set[type[Viewed]]:
 
 
 def methods(kind: type) -> list[str]:
-    return [name for name in dir(kind) if name.startswith("plot")]
+    return [name for name in dir(kind) if name.startswith("plot") and name != "plot_panel"]
 
 
 @cache
@@ -182,3 +182,22 @@ def test_nothing_overlaps(name: str, method: str, width: str) -> None:
     # Letters of a paper, and no title above the panels.
     assert max(float(text.get_fontsize()) for text in figure.findobj(Text)) <= 10.0
     assert not figure.get_suptitle()
+
+
+# One picture as a whole, or one of several records.
+WHOLE = ("Benchmark", "Comparison", "Identification, several", "Reproduction")
+
+
+@pytest.mark.parametrize("name", [name for name in OBJECTS if name not in SLOW])
+def test_every_panel_is_drawn_alone_in_axes_of_ones_own(name: str) -> None:
+    with pytest.raises(pt.ParameterError, match="panel is 'none'") as refused:
+        drawn(name).plot_panel("none")
+    _, _, names = str(refused.value).partition("one of ")
+    assert bool(names) == (name not in WHOLE)
+    for panel in filter(None, names.split(", ")):
+        figure = Figure(figsize=(3.3, 2.5), layout="constrained")
+        ax = figure.subplots()
+        assert drawn(name).plot_panel(panel, ax=ax, style="paper") is ax
+        assert ax.has_data()
+        assert faults(figure) == [], panel
+    assert plt.get_fignums() == []

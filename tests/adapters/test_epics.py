@@ -283,7 +283,7 @@ def test_a_model_is_served_within_its_limits_until_a_signal(
     monkeypatch.chdir(tmp_path)
     write_model()
     here = environment()
-    options = ("--model", "dahl.json", "--limits", "0:62", "--speed", "10")
+    options = ("dahl.json", "--limits", "0:62", "--speed", "10")
     with serving(here, "A:B", *options) as (child, line):
         assert line.endswith(", 0 to 62 V")
         assert ask(ASKED, here) == 61.0
@@ -316,9 +316,9 @@ def test_a_device_is_published_in_the_place_of_the_virtual_stage() -> None:
         ("epics --prefix A --host 127.0.0.1", "--host has no effect with epics"),
         ("epics --prefix A --device virtual: --speed 2", "--speed has no effect with --device"),
         ("epics --prefix A --device virtual: --limits 0:9", "--limits has no effect with --dev"),
-        ("epics --prefix A --device virtual: --model m", "--model has no effect with --device"),
+        ("epics --prefix A --device virtual: m.json", "MODEL has no effect with --device"),
         ("epics --prefix A --device usb:1", "--device is 'usb:1': expected an address"),
-        ("epics --prefix A --model gone.json", "gone.json: no such file"),
+        ("epics gone.json --prefix A", "gone.json: no such file"),
         ("epics --prefix A --limits 75:0", "--limits is 75 to 0 V: expected the lower one first"),
         ("epics --prefix A --speed 0", "--speed is 0: expected"),
         ("gcs --prefix A", "--prefix has no effect with gcs: expected it left out"),

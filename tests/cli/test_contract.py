@@ -44,6 +44,7 @@ TABLE = """
 --feedforward     -                                         Feedforward by the inverse of the model
 --fix             NAME=VALUE                                Known value
 --float           -                                         Numbers of 4 bytes
+--format          png|svg|pdf                               Format of pictures
 --free            A,B,...                                   Parameters to identify
 --frequencies     A,B,C                                     Frequencies of the references
 --from-rest       -                                         whole motion from rest
@@ -119,6 +120,7 @@ TABLE = """
 --unstable        -                                         loop is unstable
 --verbose         -                                         Print all lines
 --weight          NUMBER                                    Weight of a sample
+--width           WIDTH                                     Pictures for a paper
 --window          A:B                                       Part of
 --zero            -                                         isplacements
 """

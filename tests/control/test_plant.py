@@ -288,7 +288,7 @@ def test_the_command_leads_the_model_itself(
     model.save("model.json")
     course = "sine:0.5Hz,20..60um,6s"
     loop_options = ("--online", "--dt", "0.002", "--limits", "0:75")
-    printed = ran("track", "model.json", *course, *loop_options)
+    printed = ran("track", "model.json", course, *loop_options)
     found = float(printed.partition("from 2 s on: max ")[2].partition(" um")[0])
     # One interval of the hold at most, at the fastest place.
     assert found < 1e6 * math.pi * 0.5 * 40e-6 * 0.002 * 1.02

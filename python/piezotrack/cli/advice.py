@@ -23,6 +23,8 @@ OPTIONS = {
     "margins.gain": "gain_margin",
     "margins.phase": "phase_margin",
     "margins.sensitivity": "sensitivity",
+    "test": "test_window",
+    "train": "window",
     "units": "unit",
 }
 # Remedies that are no argument, the same for the command line, and the option that this takes.

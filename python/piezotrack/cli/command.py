@@ -25,7 +25,7 @@ import click
 from ..errors import ParameterError
 from .error_messages import report_errors
 from .help_page import coloured_help, help_page
-from .values import PLAIN, Names, ParamType, Quantity, Whole
+from .values import PLAIN, Names, ParamType, Quantity, Whole, named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -242,12 +242,13 @@ def _type(hint: Any) -> ParamType:
 def given(*names: str) -> list[str]:
     """Return those options of the command at work that were typed, as they are typed."""
     context = click.get_current_context()
-    typed = [
-        name
-        for name in names
-        if (source := context.get_parameter_source(name)) is not None and source.name != "DEFAULT"
+    params = {one.name: one for one in context.command.params}
+    sources = {name: context.get_parameter_source(name) for name in names}
+    return [
+        named(params[name])
+        for name, source in sources.items()
+        if source is not None and source.name != "DEFAULT"
     ]
-    return [f"--{name.replace('_', '-')}" for name in typed]
 
 
 def refuse_without_effect(options: Iterable[str], reason: str) -> None:

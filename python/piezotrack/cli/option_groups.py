@@ -66,9 +66,7 @@ class _Columns:
     ] = None
     dt: Annotated[float | None, Option("Sampling interval; default by times", LOOP_TIME)] = None
     rate: Rate = None
-    skip: Annotated[
-        int | None, Option("Lines above the titles of the columns; default recognised")
-    ] = None
+    skip: Annotated[int | None, Option("Lines above the titles; default recognised")] = None
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -112,7 +110,7 @@ class Columns(DriveColumns, DisplacementColumns):
 class LogOptions(Columns):
     """Log."""
 
-    hold: Annotated[Literal["foh", "zoh"], Option("Drive between samples: linear or constant")] = (
+    hold: Annotated[Literal["foh", "zoh"], Option("Drive between samples: linear, constant")] = (
         "foh"
     )
     resample: Annotated[

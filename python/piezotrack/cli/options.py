@@ -72,7 +72,8 @@ Window = Annotated[
 Windows = Annotated[
     list[tuple[float | None, float | None]] | None,
     Option(
-        "Part of the log that is used, as 3s:15s; default all. Once, or once for each log", WINDOW
+        "Part of the log that is used, as 3s:15s; default all. Several of one log, or one each",
+        WINDOW,
     ),
 ]
 TestLog = Annotated[Path | None, Option("Log for the test only; default FILE", metavar="FILE")]

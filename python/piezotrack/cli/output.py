@@ -9,7 +9,7 @@ import sys
 import textwrap
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ..errors import ParameterError
 from .advice import as_options
@@ -18,9 +18,14 @@ from .process.terminal import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
+    from contextlib import AbstractContextManager
+
+    from .._support.display.look import Style
 
 __all__ = ["Output", "Printing", "can_be_folder", "print_words", "wrapped"]
 
+# Formats of pictures.
+FORMATS = ("png", "svg", "pdf")
 # Lines that a command prints at most without -v.
 MOST_LINES = 25
 # Endings by which --out is a file.
@@ -90,12 +95,27 @@ class Output(Printing):
     out: Annotated[
         Path,
         Option(
-            "Folder for the results; with an ending, the file for the result of this kind alone",
+            "Folder for the results, or a file for that of its ending",
             metavar="PATH",
             names=("--out", "-o"),
         ),
     ] = Path("results")
     overwrite: Annotated[bool, Option("Replace results that exist")] = False
+    format: Annotated[
+        list[Literal["png", "svg", "pdf"]] | None,
+        Option("Format of pictures; default png and svg. Repeatable"),
+    ] = None
+    width: Annotated[
+        str | None, Option("Pictures for a paper, this wide, as 85mm", metavar="WIDTH")
+    ] = None
+
+    @property
+    def formats(self) -> tuple[str, ...]:
+        """Endings of pictures: that of the file to write, those given, or the usual ones."""
+        ending = self.out.suffix.lower().removeprefix(".")
+        if self.is_file and ending in FORMATS:
+            return (ending,)
+        return tuple(self.format or FORMATS[:2])
 
     @property
     def is_file(self) -> bool:
@@ -121,7 +141,9 @@ class Output(Printing):
             The folder cannot be made, one of the files exists and is not to be replaced, or there
             is no result of the ending of the file to write.
         """
-        names = list(names)
+        # Checked before the computation.
+        with self._style():
+            names = list(dict.fromkeys(one for name in names for one in self._formatted(name)))
         if self.is_file:
             endings = list(dict.fromkeys(Path(name).suffix for name in names))
             if self.out.suffix.lower() not in endings:
@@ -155,14 +177,27 @@ class Output(Printing):
 
         folder = make_folder(self.folder)
         if not self.is_file:
-            return list(save(folder))
-        with TemporaryDirectory() as place:
+            with self._style():
+                return list(save(folder))
+        with TemporaryDirectory() as place, self._style():
             ending = self.out.suffix.lower()
             found = sorted(save(Path(place)), key=lambda path: path.name != main)
             one = next(path for path in found if path.suffix == ending)
             with replacing(self.out) as temporary:
                 shutil.copyfile(one, temporary)
         return [self.out]
+
+    def _style(self) -> AbstractContextManager[None]:
+        """Draw and save pictures as the options say."""
+        from .._support.display.look import figure_style
+
+        style: Style | None = None if self.width is None else "paper"
+        return figure_style(style, width=self.width, formats=self.formats)
+
+    def _formatted(self, name: str) -> list[str]:
+        """Return the files that a picture becomes, of its usual formats."""
+        stem, dot, ending = name.rpartition(".")
+        return [f"{stem}{dot}{one}" for one in self.formats] if ending in FORMATS else [name]
 
 
 def can_be_folder(out: Path) -> None:
@@ -212,7 +247,7 @@ def _shortened(words: str, brief: str, most: int) -> str:
     for line in brief.split("\n"):
         # What is not a row of a table stays.
         filled += bool(line)
-        if filled <= most or line[:1] not in ("", " "):
+        if filled <= most or line.startswith("  piezotrack ") or line[:1] not in ("", " "):
             lines.append(line)
     more = len(words.split("\n")) - len(lines)
     return "\n".join([*lines, f"... {more} more lines with -v"] if more > 0 else lines)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,26 @@ def report(folder: str = "results") -> dict[str, Any]:
 
 
 # What they do.
+
+
+def test_pictures_have_the_format_and_the_width_of_a_paper() -> None:
+    ran("track", "dahl.json", COURSE, *PAPER, "--format", "pdf", "--width", "85mm")
+    assert sorted(path.name for path in Path("results").iterdir()) == [
+        "tracking.csv", "tracking.json", "tracking.pdf",
+    ]  # fmt: skip
+    page = Path("results/tracking.pdf").read_bytes()
+    box = re.search(rb"/MediaBox \[ 0 0 ([0-9.]+) ", page)
+    assert box is not None
+    # 72 points an inch.
+    assert 25.4 * float(box[1]) / 72.0 == pytest.approx(85.0, abs=0.1)
+    # One file, of its ending.
+    ran("track", "dahl.json", COURSE, *PAPER, "--out", "run.pdf")
+    assert Path("run.pdf").read_bytes().startswith(b"%PDF")
+    assert "results/tracking.csv exists" in refusal(
+        "track", "dahl.json", COURSE, *PAPER, "--format", "pdf"
+    )
+    assert "85pt" in refusal("track", "dahl.json", COURSE, *PAPER, "--width", "85pt", "--out", "a")
+    assert not Path("a").exists()
 
 
 def test_track_writes_what_python_finds() -> None:

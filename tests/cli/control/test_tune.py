@@ -187,6 +187,7 @@ def test_the_same_command_writes_the_same_bytes() -> None:
         ("--mode-spread 99", "--mode-spread is 99: expected per cent, 0 to below 95"),
         ("--gain-spread -3", "--gain-spread is -3: expected per cent, 0 to below 95"),
         ("--delay-spread -1", "--delay-spread is -1: expected a time of 0 or above"),
+        ("--stage xu-li-2010 --noise 5nm", "--noise has no effect with --stage xu-li-2010"),
         ("--delay -1", "delay is -1: expected"),
         ("--dt 0", "dt is 0.0: expected"),
         ("--limits 5", "--limits is '5': expected LOW:HIGH"),

@@ -126,6 +126,10 @@ def test_a_log_is_decimated_as_in_python() -> None:
     slow = pt.read("slow.npz")
     assert slow.dt == pytest.approx(0.004)
     assert np.array_equal(slow.y, fast.decimate(20).y)
+    # As `info` advises.
+    ran("convert", "fast.csv", "advised.npz", "--decimate", "auto")
+    assert np.array_equal(pt.read("advised.npz").y, slow.y)
+    assert "--decimate has 'much'" in refusal("convert", "fast.csv", "x.npz", "--decimate", "much")
     # The same log, whole, with a factor of 1.
     ran("convert", "fast.csv", "whole.npz", "--decimate", "1")
     assert len(pt.read("whole.npz")) == 40_000

@@ -107,7 +107,7 @@ def test_a_model_of_several_logs_is_used_like_any_other() -> None:
         "0.02",
     )
     ran("simulate", "results/dahl.json", "b.csv", "--out", "simulated.csv")
-    train = ("--window", "0:2", "--test", "2:4")
+    train = ("--window", "0:2", "--test-window", "2:4")
     ran("identify", "a.csv", *KINDS, *FIXED, "--test", "b.csv", "--out", "one")
     assert "dahl" in ran("compare", "b.csv", "--model", "results/dahl.json", *train).lower()
 
@@ -137,3 +137,13 @@ def test_what_several_logs_cannot_have_is_refused() -> None:
     assert "--weight has no effect with 1 log" in refusal("identify", "a.csv", "--weight", "2")
     write("broken.csv", "time,drive\n1,2\n")
     assert refusal("identify", "a.csv", "broken.csv", "--model", "dahl").startswith("broken.csv")
+
+
+@pytest.mark.slow
+def test_windows_of_one_log_are_several_records() -> None:
+    options = ("--window", "0:2", "--window", "2:4", "--sensor-delay", "0", "--json")
+    document = json.loads(ran("identify", "a.csv", *KINDS, *FIXED, *options))
+    (model,) = document["models"]
+    spans = [one["data"]["window_s"] for one in model["records"]]
+    assert [round(start) for start, _ in spans] == [0, 2]
+    assert all(end - start == pytest.approx(2.0, abs=0.01) for start, end in spans)

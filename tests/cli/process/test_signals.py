@@ -41,7 +41,8 @@ def stopped(command: list[str], after: float, number: signal.Signals) -> tuple[i
 
 BEGUN = [
     *(sys.executable, "-c"),
-    f"{HEADING}, interruption; interruption.answer_signals(); print('begun', flush=True); main()",
+    f"{HEADING}; from piezotrack.cli.process import interruption; "
+    "interruption.answer_signals(); print('begun', flush=True); main()",
 ]
 
 

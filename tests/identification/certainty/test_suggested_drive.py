@@ -222,7 +222,7 @@ def test_the_command_writes_drive_figures_and_picture(
     pt.identify(log, "prandtl-ishlinskii", method=pt.LeastSquares(count=3)).save("model.json")
     common = ("suggest", "model.json", "--slew", "2000", "--duration", "1", "--dt", "0.002")
     printed = ran(*common, "--limits", "0:75")
-    assert "piezotrack measure results/suggested.csv --device ADDRESS --rate 500" in printed
+    assert "piezotrack measure results/suggested.csv --device ADDRESS --rate 500Hz" in printed
     document = json.loads(Path("results/suggested.json").read_text(encoding="utf-8"))
     assert document["samples"] == 500
     assert document["parameters"]["linear"]["standard_deviation"] > 0.0

@@ -102,10 +102,10 @@ def test_no_volt_is_spoken_of(kind: str) -> None:
     fit = pt.identify(height(), kind, method=[pt.Descents(seed=1), pt.LeastSquares()])
     words = [fit.summary(), *fit.extrapolation_notes(3.0 * height().u, 1e-4)]
     assert len(words) == 3
-    assert height().plot().axes[0].get_ylabel() == "drive [um]"
+    assert height().plot().axes[0].get_ylabel() == "drive [\N{MICRO SIGN}m]"
     axes = plot_loop(height(), fit.simulate(height()))
     words += [axes.get_xlabel()]
-    assert axes.get_xlabel() == "drive [um]"
+    assert axes.get_xlabel() == "drive [\N{MICRO SIGN}m]"
     assert np.max(axes.lines[0].get_xdata()) == pytest.approx(40.0, rel=1e-3)
     plt.close("all")
     for text in words:
@@ -179,7 +179,7 @@ def test_closed_loops_take_it() -> None:
     assert 0.0 <= rows["drive_um"].min() < 20.0 < rows["drive_um"].max() <= 45.0
     late = rows["time_s"] > 2.0
     assert np.abs(rows["desired_um"] - rows["measured_um"])[late].max() < 0.5
-    match = refusal("track", model, *course[:2], "--kp", "900", "--ti", "0.02", "--overwrite")
+    match = refusal("track", model, *course[:3], "--kp", "900", "--ti", "0.02", "--overwrite")
     assert re.search(r"on this stage, [\d.]+ um/um; at the limit kp would be [\d.]+ um/um", match)
     match = refusal("track", model, "sine:1Hz,5..400um", "--overwrite")
     assert re.search(r"which this stage reaches from [\d.]+ to [\d.]+ um", match)

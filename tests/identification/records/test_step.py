@@ -488,7 +488,7 @@ def test_the_command(tmp_path: Path) -> None:
     write_columns(file, {"time_s": log.t, "voltage_V": log.u, "displacement_um": 1e6 * log.y})
     runner = CliRunner()
     out = str(tmp_path / "results")
-    done = runner.invoke(app, ["step", str(file), "--out", out, "--fix", "stiffness=26065"])
+    done = runner.invoke(app, ["step", str(file), "--out", out, "--fix", "stiffness=26065", "-v"])
     assert (done.exit_code, done.stderr) == (0, "")
     step = pt.identify_step(pt.read(file, hold="zoh"), stiffness=26065.0)
     assert done.stdout.startswith(step.summary())

@@ -170,22 +170,7 @@ def _fewer(ax: Axes, name: str, axis: Axis) -> bool:
 
 
 def place_legend(ax: Axes, columns: int, part: float) -> Legend:
-    """Put a legend at the top of axes, in room that is made above the data.
-
-    Parameters
-    ----------
-    ax : matplotlib.axes.Axes
-        Axes with their limits in `ROOMS`.
-    columns : int
-        Columns of the legend.
-    part : float
-        Part of the height that it takes.
-
-    Returns
-    -------
-    matplotlib.legend.Legend
-        The legend.
-    """
+    """Put a legend at the top of axes, in room made above the data of `part` of the height."""
     low, high, _ = ROOMS[ax]
     part = min(part, 0.7)
     if ax.get_yscale() == "log":

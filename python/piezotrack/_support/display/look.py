@@ -17,11 +17,15 @@ from ..messages import quoted
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from matplotlib.axes import Axes
+
     P = ParamSpec("P")
     R = TypeVar("R")
 
 __all__ = [
+    "CHOSEN",
     "FORMATS",
+    "Chosen",
     "Look",
     "Style",
     "Width",
@@ -100,6 +104,25 @@ class Look:
 
 SCREEN = Look()
 _LOOK: ContextVar[Look] = ContextVar("look", default=SCREEN)
+
+
+@dataclass
+class Chosen:
+    """The one panel of a picture that is drawn, in axes given or made for it.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the picture.
+    ax : Axes or None
+        Where it is drawn; None until it is known.
+    """
+
+    name: str
+    ax: Axes | None = None
+
+
+CHOSEN: ContextVar[Chosen | None] = ContextVar("chosen", default=None)
 _INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
 
 
@@ -168,25 +191,35 @@ def drawing(view: Callable[P, R]) -> Callable[P, R]:
     Returns
     -------
     callable
-        The same with two more keywords, `style` and `width` of `figure_style`.
+        The same with more keywords: `style` and `width` of `figure_style`, and `panel`, which alone
+        is then drawn and returned.
     """
 
     @wraps(view)
-    def draw(*args: Any, style: Any = None, width: Any = None, **options: Any) -> Any:
+    def draw(
+        *args: Any,
+        style: Any = None,
+        width: Any = None,
+        panel: Any = None,
+        **options: Any,
+    ) -> Any:
         import matplotlib as mpl
 
         from .fitting import fit_in, parts_of
 
         if _INSIDE.get():
             return view(*args, **options)
-        token = _INSIDE.set(True)
+        token, chosen = _INSIDE.set(True), CHOSEN.set(panel)
         try:
             with figure_style(style, width=width), mpl.rc_context(look().settings):
-                before = parts_of([*args, *options.values()])
-                drawn = view(*args, **options)
-                fit_in(drawn, before, thin=look().paper)
+                before = parts_of([*args, *options.values(), panel and panel.ax])
+                drawn: Any = view(*args, **options)
+                drawn = panel.ax if panel else drawn
+                with without_glyph_warnings():
+                    fit_in(drawn, before, thin=look().paper)
         finally:
             _INSIDE.reset(token)
+            CHOSEN.reset(chosen)
         return drawn
 
     return draw

@@ -14,7 +14,7 @@ from ...errors import ParameterError
 from ..arguments import expect, has_entries
 from ..messages import quoted
 from .fitting import ROOMS, place_legend, whole
-from .look import drawing, look
+from .look import CHOSEN, drawing, look
 from .wrapping import folded
 
 if TYPE_CHECKING:
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, FigureBase, SubFigure
     from numpy.typing import NDArray
+
+    from .look import Chosen
 
     Array = NDArray[np.float64]
 
@@ -56,6 +58,7 @@ __all__ = [
     "names_beside",
     "panels",
     "plain_log_ticks",
+    "share",
     "sheet",
     "thinned",
     "trace",
@@ -150,6 +153,10 @@ def panels(given: Figure | SubFigure | None, size: tuple[float, float]) -> Figur
     """Return the figure to draw in: the one given, or a new one of a size in inches."""
     from matplotlib.figure import FigureBase
 
+    if (chosen := CHOSEN.get()) is not None:
+        raise ParameterError(
+            "panel", quoted(chosen.name), "plot(), as this picture has no panels drawn alone"
+        )
     if given is None:
         return _new_figure(size)
     expect("fig", given, FigureBase, "a figure of Matplotlib, or a part of one")
@@ -197,6 +204,8 @@ def sheet(
     figure, axes
         The figure, and the axes by their names.
     """
+    if (chosen := CHOSEN.get()) is not None:
+        return _alone(chosen, rows)
     parts, across = heights or [1.0] * len(rows), widths or [1.0] * len(rows[0])
     if len(across) > 1 and is_narrow(given, size):
         cell = size[1] / sum(parts), size[0] / sum(across)
@@ -212,6 +221,24 @@ def sheet(
         [list(row) for row in rows], height_ratios=parts, width_ratios=across
     )
     return figure, axes
+
+
+def _alone(chosen: Chosen, rows: Sequence[Sequence[str]]) -> tuple[FigureBase, dict[str, Axes]]:
+    """Make the axes of one panel, and a figure that nobody sees for the others."""
+    from matplotlib.figure import Figure
+
+    unseen = Figure()
+    axes = unseen.subplot_mosaic([list(row) for row in rows])
+    if chosen.name not in axes:
+        raise ParameterError("panel", quoted(chosen.name), "one of " + ", ".join(axes))
+    (chosen.ax,) = axes_or_new(chosen.ax, 1)
+    return unseen, {**axes, chosen.name: chosen.ax}
+
+
+def share(ax: Axes, other: Axes, axis: str = "x") -> None:
+    """Give two panels one axis, where both are in the picture."""
+    if CHOSEN.get() is None:
+        getattr(ax, f"share{axis}")(other)
 
 
 def _proportion(
@@ -280,20 +307,7 @@ def trace(
 ) -> None:
     """Draw a signal over time, thinned, from the first to the last instant.
 
-    Parameters
-    ----------
-    ax : matplotlib.axes.Axes
-        Where to draw.
-    t, values : ndarray, shape (n,)
-        Times, and the signal.
-    style : mapping
-        Of the line.
-    steps : bool, optional
-        Whether each value holds until the next.
-    zero : bool, optional
-        Whether a line is drawn through 0.
-    xlabel, ylabel : str, optional
-        Labels of the axes.
+    With `steps` each value holds until the next; with `zero` a line is drawn through 0.
     """
     kept = thinned(values)
     ax.plot(t[kept], values[kept], drawstyle="steps-post" if steps else "default", **style)

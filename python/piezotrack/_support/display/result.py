@@ -6,6 +6,8 @@ from html import escape
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from .look import Chosen
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
@@ -76,6 +78,49 @@ class Viewed:
         """
         figure: Figure = self.view("plot")(self, fig, style=style, width=width)
         return figure
+
+    def plot_panel(
+        self,
+        panel: str,
+        *,
+        ax: Axes | None = None,
+        style: Style | None = None,
+        width: Width | None = None,
+    ) -> Axes:
+        """Draw one panel of the picture alone.
+
+        Parameters
+        ----------
+        panel : str
+            Its name; that of another is refused with the names of all.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure of pyplot where not given.
+        style : {"screen", "paper"}, optional
+            As in `piezotrack.figure_style`.
+        width : str or float, optional
+            Width of a new figure, as ``"85mm"``; a number is in metres.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes drawn on.
+
+        Raises
+        ------
+        ParameterError
+            There is no such panel.
+
+        Examples
+        --------
+        >>> from matplotlib.figure import Figure
+        >>> import piezotrack as pt
+        >>> log = pt.datasets.dbo_training()[3.0:8.0]
+        >>> log.plot_panel("loop", ax=Figure().subplots()).get_xlabel()
+        'drive [V]'
+        """
+        chosen = Chosen(panel, ax)
+        axes: Axes = self.view("plot")(self, style=style, width=width, panel=chosen)
+        return axes
 
     def _repr_html_(self) -> str:
         table: str = self.view("html")(self)

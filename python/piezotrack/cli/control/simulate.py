@@ -27,7 +27,7 @@ def simulate_command(
     *,
     columns: DriveColumns,
     hold: Annotated[
-        Literal["foh", "zoh"], Option("Drive between samples: linear or constant")
+        Literal["foh", "zoh"], Option("Drive between samples: linear, constant")
     ] = "foh",
     output: Output,
 ) -> None:

@@ -79,6 +79,9 @@ def identify_command(
     options = FitOptions(**vars(parameters), **vars(structure), seed=seed, runs=runs)
     options.check()
     kinds.refuse_of_others(options.parameters())
+    if window is not None and len(files) == 1:
+        # Parts of one log are several records.
+        files = files * len(window)
     sensor.check(len(files))
     weights = each_of("--weight", weight, len(files))
     if weight and len(files) == 1:

@@ -16,6 +16,7 @@ from ..._support.display.plot_style import (
     drawing,
     heading,
     legend_inside,
+    share,
     sheet,
     trace,
     whole,
@@ -49,8 +50,8 @@ def plot_before_and_after(
     figure, axes = sheet(fig, (10.0, 7.4), rows, heights=(1.7, 1.0))
     names = list(runs)
     left, right, below = (axes[name] for name in ("before", "after", "error"))
-    right.sharex(left)
-    right.sharey(left)
+    share(right, left)
+    share(right, left, "y")
     for ax, when, name in ((left, "Before", names[0]), (right, "After", names[-1])):
         _plot_loop(ax, runs[name])
         rms = 1e6 * runs[name].metrics.rms_error

@@ -15,6 +15,7 @@ from ..._support.display.plot_style import (
     legend_inside,
     names_beside,
     plain_log_ticks,
+    share,
     sheet,
     whole,
 )
@@ -47,7 +48,7 @@ def plot_controllers(
     least = 1.5 + 0.25 * len(rows)
     drawn, axes = sheet(fig, size, (("references", "stages"),), least=least)
     left, right = axes.values()
-    right.sharey(left)
+    share(right, left, "y")
     places = np.arange(float(len(rows)))[::-1]
     for k, name in enumerate(comparison.references):
         cells = [row.cells[0][k] for row in rows]

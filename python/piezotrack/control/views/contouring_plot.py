@@ -18,6 +18,7 @@ from ..._support.display.plot_style import (
     drawing,
     legend_inside,
     literal,
+    share,
     sheet,
     trace,
     whole,
@@ -114,7 +115,7 @@ def plot_contour(run: Contour, fig: Figure | SubFigure | None = None) -> Figure:
     plot_path(run, axes["path"])
     plot_magnified(run, axes["magnified"])
     part = run.last_turn
-    axes["y"].sharey(axes["x"])
+    share(axes["y"], axes["x"], "y")
     for name, axis in (("x", run.x), ("y", run.y)):
         error = 1e6 * axis.error[part]
         trace(axes[name], run.t[part], error, ERROR, zero=True, ylabel=f"error of {name} [um]")

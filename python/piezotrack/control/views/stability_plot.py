@@ -16,6 +16,7 @@ from ..._support.display.plot_style import (
     caption,
     drawing,
     legend_inside,
+    share,
     sheet,
     whole,
 )
@@ -58,7 +59,7 @@ def plot_loop_report(report: LoopReport, fig: Figure | SubFigure | None = None) 
     parts.set(xlabel="frequency [Hz]", ylabel="magnitude")
     _mark_crossover(report, size, phase)
     for ax in (size, phase):
-        ax.sharex(parts)
+        share(ax, parts)
         ax.tick_params(labelbottom=False)
     for ax in (size, parts):
         ax.set_ylim(bottom=max(LOWEST, ax.get_ylim()[0]))

@@ -22,6 +22,7 @@ from ..._support.display.plot_style import (
     drawing,
     legend_inside,
     literal,
+    share,
     sheet,
     thinned,
     trace,
@@ -174,26 +175,7 @@ def plot_feedforward(
     drive_unit: str = "V",
     limits: Sequence[float] | None = None,
 ) -> Figure:
-    """Plot reference and feedforward over time, and the feedforward over the reference.
-
-    Parameters
-    ----------
-    t, voltage, x : ndarray, shape (n,)
-        Time [s], feedforward in `drive_unit`, reference [m].
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Figure to draw in; default a new one.
-    title : str, optional
-        Title of the picture.
-    drive_unit : str, optional
-        Unit of the drive, SI.
-    limits : (float, float), optional
-        Limits of the drive, which are drawn.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Plot a reference `x` [m] and its feedforward over time, and over each other, with limits."""
     rows = (("reference", "over"), ("drive", "over"))
     figure, axes = sheet(fig, (11.0, 4.8), rows, widths=(1.35, 1.0), down=True)
     unit, scale = shown_unit(drive_unit)
@@ -202,7 +184,7 @@ def plot_feedforward(
     trace(axes["reference"], t, 1e6 * x, reference, ylabel="reference [um]")
     drive = axes["drive"]
     trace(drive, t, scale * voltage, FEEDFORWARD, steps=True, xlabel="time [s]", ylabel=label)
-    drive.sharex(axes["reference"])
+    share(drive, axes["reference"])
     kept = thinned(voltage)
     axes["over"].plot(1e6 * x[kept], scale * voltage[kept], **FEEDFORWARD)
     axes["over"].set(xlabel="reference [um]", ylabel=label)

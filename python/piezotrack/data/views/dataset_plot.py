@@ -11,6 +11,7 @@ from ..._support.display.plot_style import (
     drawing,
     heading,
     literal,
+    share,
     sheet,
     thinned,
     trace,
@@ -32,7 +33,7 @@ def plot_dataset(data: Dataset, fig: Figure | SubFigure | None = None) -> Figure
     rows = (("drive", "loop"), ("displacement", "loop"))
     figure, axes = sheet(fig, (11.0, 4.8), rows, widths=(1.35, 1.0), down=True)
     drive, displacement, loop = (axes[name] for name in ("drive", "displacement", "loop"))
-    drive.sharex(displacement)
+    share(drive, displacement)
     unit, scale = best_length_unit(data.stroke)
     name, times = shown_unit(data.drive_unit)
     u = times * data.u

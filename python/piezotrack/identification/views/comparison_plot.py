@@ -19,6 +19,7 @@ from ..._support.display.plot_style import (
     literal,
     names_beside,
     panels,
+    share,
     trace,
     whole,
 )
@@ -149,7 +150,7 @@ def _errors(comparison: Comparison, axes: list[Axes]) -> None:
         if ax is axes[len(axes) // 2]:
             ax.set_ylabel(f"error [{unit}]")
         ax.set_title(_heading(row), fontsize="small", loc="left")
-        ax.sharex(axes[0])
+        share(ax, axes[0])
         ax.tick_params(labelbottom=ax is axes[-1])
     how = "" if comparison.carried else ", the other record after the first"
     axes[-1].set_xlabel(f"time [s]{how}")

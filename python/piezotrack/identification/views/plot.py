@@ -26,6 +26,7 @@ from ..._support.display.plot_style import (
     literal,
     panels,
     plain_log_ticks,
+    share,
     sheet,
     thinned,
     trace,
@@ -83,24 +84,7 @@ def _check(data: Dataset, run: Response) -> None:
 def plot_loop(
     data: Dataset, run: Response, ax: Axes | None = None, *, title: str = "Hysteresis loop"
 ) -> Axes:
-    """Draw the hysteresis loop: displacement over drive, measured and simulated.
-
-    Parameters
-    ----------
-    data : Dataset
-        The record.
-    run : Response
-        Response of the model on that record.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure where not given.
-    title : str, optional
-        What ran.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes drawn on.
-    """
+    """Draw the hysteresis loop: displacement over drive, measured and simulated."""
     _check(data, run)
     (ax,) = axes_or_new(ax, 1)
     _loop(ax, data.u, {"measured": data.y, "simulated": run.x}, data.drive_unit)
@@ -135,27 +119,8 @@ def plot_time(
 ) -> tuple[Axes, Axes]:
     """Draw measured and simulated displacement over time, and the error below.
 
-    Parameters
-    ----------
-    data : Dataset
-        The record.
-    run : Response
-        Response of the model on that record.
-    axes : two matplotlib.axes.Axes, optional
-        Where to draw; a new figure where not given.
-    stroke : float, optional
-        Stroke that the percentage refers to [m]; the record's own where not given.
-    fitted_until : float, optional
-        Time [s] up to which the record was fitted; a line marks it.
-    half : ndarray, shape (n,), optional
-        Half width of the band in which 95 % of the errors are expected [m].
-    title : str, optional
-        What ran.
-
-    Returns
-    -------
-    tuple of two matplotlib.axes.Axes
-        Displacement, error.
+    The error is in per cent of `stroke` [m], that of the record where not given; a line marks the
+    time `fitted_until` [s], and `half` is the half width of the band of 95 % of the errors [m].
     """
     _check(data, run)
     stroke = data.stroke if stroke is None else positive("stroke", stroke, "m")
@@ -203,27 +168,7 @@ def plot_time(
 def plot_convergence(
     fit: Identification, ax: Axes | None = None, *, title: str = "Convergence"
 ) -> Axes:
-    """Draw the best cost of the swarm after each iteration, and where the other restarts ended.
-
-    Parameters
-    ----------
-    fit : Identification
-        Result of a search.
-    ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure where not given.
-    title : str, optional
-        What ran.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-        The axes drawn on.
-
-    Raises
-    ------
-    ParameterError
-        The model was not searched.
-    """
+    """Draw the best cost of the swarm after each iteration, and where the other restarts ended."""
     search = fit.search
     if search is None:
         raise ParameterError("fit", "a model fitted by least squares", "one of a search")
@@ -270,26 +215,7 @@ def plot_response(
     drive_unit: str = "V",
     measured: Array | None = None,
 ) -> Figure:
-    """Draw a simulated displacement over time and over the drive, and the measured one.
-
-    Parameters
-    ----------
-    t, u, x : ndarray, shape (n,)
-        Time [s], drive in `drive_unit`, displacement [m].
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-    title : str, optional
-        What ran.
-    drive_unit : str, optional
-        Unit of the drive, SI.
-    measured : ndarray, shape (n,), optional
-        Displacement in the log [m].
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in.
-    """
+    """Draw a simulated displacement `x` [m] over time and over the drive, and the measured one."""
     figure, axes = sheet(fig, (11.0, 4.2), (("time", "loop"),))
     signals = {"simulated": x} if measured is None else {"measured": measured, "simulated": x}
     unit, scale = best_length_unit(max(float(np.ptp(one)) for one in signals.values()))
@@ -314,24 +240,7 @@ def plot_model(
 ) -> Figure:
     """Draw loop, displacement, error and, after a search, convergence in one figure.
 
-    Parameters
-    ----------
-    model : IdentifiedModel
-        The model.
-    data : Dataset, optional
-        The record to show it on; that of the fit where not given.
-    fig : matplotlib.figure.Figure or SubFigure, optional
-        Where to draw; a new figure where not given.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure drawn in, with four panels or three.
-
-    Raises
-    ------
-    ParameterError
-        There is no record.
+    On `data`, or on the record of the fit; of a model without a record the loops in its range.
     """
     fit = model if isinstance(model, Identification) else None
     if fit is not None and data is None and len(fit.records) > 1:
@@ -346,7 +255,7 @@ def plot_model(
     if fit is not None and searched:
         plot_convergence(fit, axes["convergence"])
     both = axes["time"], axes["error"]
-    both[1].sharex(both[0])
+    share(both[1], both[0])
     plot_time(record, run, both, stroke=model.stroke, half=band_of(model, record))
     title = what_was_shown(model, record, run)
     caption(figure, what_was_fitted(fit) if fit and data is None else title)
@@ -432,7 +341,7 @@ def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
         _, axes = sheet(part, (11.0, 4.6), rows, widths=(1.0, 1.35))
         plot_loop(record.data, run, axes["loop"])
         both = axes["time"], axes["error"]
-        both[1].sharex(both[0])
+        share(both[1], both[0])
         half = band_of(fit, record.data)
         plot_time(record.data, run, both, stroke=record.stroke, half=half)
         caption(part, what_was_fitted(fit, record))

@@ -120,7 +120,7 @@ class SuggestedDrive(Result):
         return f"<SuggestedDrive, {self.u.size} samples in {plain(self.u.size * self.dt)} s>"
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write time and drive as a CSV file, which ``piezotrack measure --drive`` plays.
+        """Write time and drive as a CSV file, which ``piezotrack measure`` plays.
 
         Parameters
         ----------

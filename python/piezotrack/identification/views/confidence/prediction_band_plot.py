@@ -21,6 +21,7 @@ from ...._support.display.plot_style import (
     heading,
     legend_inside,
     literal,
+    share,
     sheet,
     thinned,
     whole,
@@ -43,7 +44,7 @@ def plot_band(band: PredictionBand, fig: Figure | SubFigure | None = None) -> Fi
     figure, axes = sheet(fig, (11.0, 5.6), rows, widths=(1.0, 1.35))
     _loop(band, axes["loop"])
     _time(band, axes["time"])
-    axes["parts"].sharex(axes["time"])
+    share(axes["parts"], axes["time"])
     _parts(band, axes["parts"])
     return whole(figure)
 
