@@ -82,7 +82,9 @@ def help_page(command: Any, ctx: click.Context) -> str:
         "Output": [],
         **sections,
     }
-    ordered["Output"] = ordered.pop("Output") + ends
+    last = "Output" if ordered["Output"] else "Options"
+    ordered[last] = [*ordered[last], *ends]
+    ordered["Output"] = ordered.pop("Output")
     for title, rows in ordered.items():
         if rows:
             parts.append(f"{title}:\n{_table(rows)}")
