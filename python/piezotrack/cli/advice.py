@@ -71,18 +71,7 @@ command_at_work: ContextVar[click.Command | None] = ContextVar("_command", defau
 
 
 def as_options(error: object) -> str:
-    """Say in options what the library says in arguments.
-
-    Parameters
-    ----------
-    error : PiezotrackError or str
-        An error, a remark or a table.
-
-    Returns
-    -------
-    str
-        The same; what the command at work has no option for is left in Python's words.
-    """
+    """Say in options what the library says in arguments."""
     command = command_at_work.get()
     known = {name for one in command.params for name in one.opts} if command else set()
 

@@ -37,24 +37,13 @@ T = TypeVar("T")
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def group(options: type[T]) -> type[T]:
-    """Make a group of options of a class: a frozen dataclass of keywords.
-
-    Parameters
-    ----------
-    options : type
-        Annotated fields with defaults; the first line of its docstring is the heading in the help.
-
-    Returns
-    -------
-    type
-        The dataclass.
-    """
+    """Make a group of options of a class: a frozen dataclass of keywords."""
     return dataclass(frozen=True, kw_only=True)(options)
 
 
 @dataclass(frozen=True)
 class Option:
-    """What an annotation says of an option.
+    """Help, type and names of an option, as an annotation.
 
     Parameters
     ----------
@@ -76,7 +65,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Argument:
-    """What an annotation says of a positional argument: its help and its metavar."""
+    """Help and metavar of a positional argument, as an annotation."""
 
     help: str
     metavar: str
@@ -108,16 +97,6 @@ def command(**defaults: Any) -> Callable[[Callable[..., None]], Command]:
 
     Arguments of a dataclass are groups: their fields become options under the heading of the
     first line of its docstring.
-
-    Parameters
-    ----------
-    **defaults : object
-        Defaults of options of groups that this command has in place of theirs.
-
-    Returns
-    -------
-    callable
-        The decorator.
     """
 
     def made(function: Callable[..., None]) -> Command:

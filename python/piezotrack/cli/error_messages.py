@@ -73,13 +73,7 @@ def report_errors(command: Callable[P, None]) -> Callable[P, None]:
 
 
 def say(sentence: str) -> None:
-    """Print one sentence on stderr.
-
-    Parameters
-    ----------
-    sentence : str
-        Of an error.
-    """
+    """Print one sentence on stderr."""
     # There is nowhere to say that it cannot be said.
     with suppress(OSError):
         print(f"piezotrack: {one_line(sentence)}", file=sys.stderr, flush=True)
@@ -93,18 +87,7 @@ def _stopped(error: KeyboardInterrupt) -> int:
 
 
 def of_the_system(error: OSError) -> int:
-    """Say which file an error is about, or that nothing can be printed.
-
-    Parameters
-    ----------
-    error : OSError
-        Of a file, or of the output.
-
-    Returns
-    -------
-    int
-        The exit code.
-    """
+    """Say which file an error is about, or that nothing can be printed."""
     reason = (error.strerror or str(error)).lower()
     if error.filename is not None:
         say(f"{error.filename}: {reason}")

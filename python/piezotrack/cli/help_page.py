@@ -21,18 +21,7 @@ BOLD, CYAN, PLAIN = "\033[1m", "\033[36m", "\033[0m"
 
 
 def coloured_help(option: click.Option | None) -> click.Option | None:
-    """Let an option ``--help`` print in colour on a terminal that has it.
-
-    Parameters
-    ----------
-    option : click.Option or None
-        The option of a command.
-
-    Returns
-    -------
-    click.Option or None
-        The same.
-    """
+    """Let an option ``--help`` print in colour on a terminal that has it."""
     if option is not None:
         option.callback, option.help = _print_help, "Print this help"
     return option
@@ -64,20 +53,7 @@ def _coloured(line: str) -> str:
 
 
 def help_page(command: Any, ctx: click.Context) -> str:
-    """Write the help of a command.
-
-    Parameters
-    ----------
-    command : Command
-        The command.
-    ctx : click.Context
-        Of this call.
-
-    Returns
-    -------
-    str
-        Usage, sentences, and the options, those of a group under its heading.
-    """
+    """Write the help of a command."""
     parts = [f"Usage: {ctx.command_path} {' '.join(command.collect_usage_pieces(ctx))}"]
     parts = [textwrap.fill(parts[0], _width(), subsequent_indent="    ")]
     for paragraph in (command.help or "").split("\n\n"):
@@ -97,18 +73,18 @@ def help_page(command: Any, ctx: click.Context) -> str:
         if param.param_type_name == "option" and param.name == "rate" and _merged(sections, title):
             continue
         sections.setdefault(title, []).append((name, text))
-    last = sections.pop("Output", [])
+    # Options without a group stand before the groups, --help last.
     options = sections.pop("Options", [])
-    ordered = {"Arguments": sections.pop("Arguments", []), **sections}
-    # Options without a group stand first, --help last.
-    head = [one for one in options if one[0] != "--help"]
-    tail = [*last, *(one for one in options if one[0] == "--help")]
+    ends = [one for one in options if one[0] == "--help"]
     ordered = {
-        "Arguments": ordered.pop("Arguments"),
-        "Options": head,
-        **ordered,
-        "Output": tail,
+        "Arguments": sections.pop("Arguments", []),
+        "Options": [one for one in options if one not in ends],
+        "Output": [],
+        **sections,
     }
+    last = "Output" if ordered["Output"] else "Options"
+    ordered[last] = [*ordered[last], *ends]
+    ordered["Output"] = ordered.pop("Output")
     for title, rows in ordered.items():
         if rows:
             parts.append(f"{title}:\n{_table(rows)}")
@@ -118,20 +94,7 @@ def help_page(command: Any, ctx: click.Context) -> str:
 def list_page(
     usage: str, sentence: str, sections: dict[str, list[tuple[str, str]]], end: str
 ) -> str:
-    """Write a list of commands under headings.
-
-    Parameters
-    ----------
-    usage, sentence, end : str
-        First line, second paragraph, last paragraph.
-    sections : dict of str to list of tuple
-        Name and sentence of each command, by heading.
-
-    Returns
-    -------
-    str
-        The page.
-    """
+    """Write a list of commands under headings."""
     tables = [f"{title.capitalize()}:\n{_table(rows)}" for title, rows in sections.items() if rows]
     return "\n\n".join([usage, textwrap.fill(sentence, _width()), *tables, end])
 

@@ -64,19 +64,7 @@ class Printing:
         *,
         brief: str | None = None,
     ) -> None:
-        """Print the results.
-
-        Parameters
-        ----------
-        words : str
-            For a person.
-        document : mapping
-            The same for a program: numbers, texts, lists and dicts only.
-        written : iterable of pathlib.Path, optional
-            The files; default none can be written.
-        brief : str, optional
-            Part of `words` that is printed without ``-v``; default all, as far as it fits.
-        """
+        """Print the results."""
         files = list(written or ())
         if self.json:
             from .._support.files.writing import json_ready
@@ -128,19 +116,7 @@ class Output(Printing):
         return self.out.parent if self.is_file else self.out
 
     def will_write(self, names: Iterable[str]) -> None:
-        """Refuse a folder that cannot be written to, or results that exist.
-
-        Parameters
-        ----------
-        names : iterable of str
-            The files of this command, without the folder.
-
-        Raises
-        ------
-        ParameterError
-            The folder cannot be made, one of the files exists and is not to be replaced, or there
-            is no result of the ending of the file to write.
-        """
+        """Refuse a folder that cannot be written to, or results that exist."""
         # Checked before the computation.
         with self._style():
             names = list(dict.fromkeys(one for name in names for one in self._formatted(name)))
@@ -157,20 +133,7 @@ class Output(Printing):
                 raise ParameterError(f"{path} exists: expected --overwrite, or another --out")
 
     def write(self, save: Callable[[Path], Iterable[Path]], main: str = "") -> list[Path]:
-        """Write the results, or the one that the ending of a file chooses.
-
-        Parameters
-        ----------
-        save : callable
-            Writes all results in a folder, and returns their paths.
-        main : str, optional
-            Name of the result that comes first among those of its ending.
-
-        Returns
-        -------
-        list of pathlib.Path
-            The files.
-        """
+        """Write the results, or the one that the ending of a file chooses."""
         import shutil
 
         from .._support.files.writing import make_folder, replacing
@@ -201,18 +164,7 @@ class Output(Printing):
 
 
 def can_be_folder(out: Path) -> None:
-    """Refuse a folder that cannot be written to before the computation begins.
-
-    Parameters
-    ----------
-    out : pathlib.Path
-        The folder.
-
-    Raises
-    ------
-    ParameterError
-        It cannot be made or written to.
-    """
+    """Refuse a folder that cannot be written to before the computation begins."""
     there = out
     try:
         while not there.exists() and there != there.parent:
@@ -257,11 +209,6 @@ def print_words(words: str) -> None:
     """Print lines for a person, in the options of the command and as wide as the terminal.
 
     Where the output is no terminal, and ``COLUMNS`` is not set, each line stays whole.
-
-    Parameters
-    ----------
-    words : str
-        One line or several.
     """
     print(wrapped(as_options(words), _columns()))
 

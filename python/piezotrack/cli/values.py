@@ -103,25 +103,7 @@ class Quantity(ParamType):
         return value if isinstance(value, Number) else self.parse(named(param), str(value))
 
     def parse(self, option: str, text: str) -> Number:
-        """Parse a number with or without its unit.
-
-        Parameters
-        ----------
-        option : str
-            Name of the option, for errors.
-        text : str
-            As ``"20ms"``.
-
-        Returns
-        -------
-        Number
-            In SI for times, voltages and lengths, else in the first of `units`.
-
-        Raises
-        ------
-        ParameterError
-            It is no number, its unit is unknown, or it needs one.
-        """
+        """Parse a number with or without its unit."""
         found = NUMBER.fullmatch(text)
         if found is None:
             raise ParameterError(option, f"'{text}'", self._expected, verb="has")
@@ -200,25 +182,7 @@ class Ranged(ParamType):
         return value if isinstance(value, tuple) else self.parse(named(param), str(value))
 
     def parse(self, option: str, text: str) -> tuple[Number | None, Number | None]:
-        """Parse the two numbers.
-
-        Parameters
-        ----------
-        option : str
-            Name of the option, for errors.
-        text : str
-            As ``"3:15s"``.
-
-        Returns
-        -------
-        tuple of two Number or None
-            None for an end that is left out.
-
-        Raises
-        ------
-        ParameterError
-            It has another form, or one of them is no number of the quantity.
-        """
+        """Parse the two numbers."""
         first, colon, last = text.partition(":")
         if not colon or (not self.open and not (first and last)):
             raise ParameterError(option, f"'{text}'", f"{self.name}, {self._example}")
@@ -294,20 +258,7 @@ class Names(ParamType):
 
 
 def nearest(text: str, names: Iterable[str]) -> str:
-    """Say which name may be meant.
-
-    Parameters
-    ----------
-    text : str
-        What was typed.
-    names : iterable of str
-        Those that are known.
-
-    Returns
-    -------
-    str
-        The end of a sentence, or nothing.
-    """
+    """Say which name may be meant."""
     by_lower = {name.lower().lstrip("-"): name for name in names}
     text = text.lower().lstrip("-")
     near = [low for low in by_lower if len(text) > 2 and low.startswith(text)][:1]
@@ -316,40 +267,14 @@ def nearest(text: str, names: Iterable[str]) -> str:
 
 
 def numbers(option: str, text: str, of: Quantity) -> list[Number]:
-    """Parse numbers between commas; a bare one has the unit of the last.
-
-    Parameters
-    ----------
-    option : str
-        Name of the option, for errors.
-    text : str
-        As ``"1,5,20Hz"``.
-    of : Quantity
-        Of all.
-
-    Returns
-    -------
-    list of Number
-        Each in the unit of `of`.
-    """
+    """Parse numbers between commas; a bare one has the unit of the last."""
     parts = [part.strip() for part in text.split(",")]
     unit = of.parse(option, parts[-1]).unit
     return [of.parse(option, part + unit if BARE.fullmatch(part) else part) for part in parts]
 
 
 def named(param: click.Parameter | None) -> str:
-    """Return the name of an option or argument as it is typed.
-
-    Parameters
-    ----------
-    param : click.Parameter or None
-        The option or argument.
-
-    Returns
-    -------
-    str
-        As ``"--dt"`` or ``"FILE"``.
-    """
+    """Return the name of an option or argument as it is typed."""
     if param is None:
         return "value"
     if isinstance(param, click.Argument):

@@ -18,23 +18,7 @@ __all__ = ["controller_in", "only_controller", "stage_of_controller"]
 
 
 def controller_in(file: Path) -> Controller | None:
-    """Load a controller, or return None where the file is another.
-
-    Parameters
-    ----------
-    file : pathlib.Path
-        A controller file, or a model file.
-
-    Returns
-    -------
-    Controller or None
-        The controller.
-
-    Raises
-    ------
-    DataError
-        The file is missing, is no JSON, or is a controller with an entry that is wrong.
-    """
+    """Load a controller, or return None where the file is another."""
     from ...control.controller.controller import FORMAT
     from ...control.controller.load import load_controller
     from ...identification.fitted.model_file import read_content
@@ -46,25 +30,7 @@ def controller_in(file: Path) -> Controller | None:
 
 
 def only_controller(file: Path, remedy: str) -> Controller:
-    """Load a controller; a model is refused with what to do.
-
-    Parameters
-    ----------
-    file : pathlib.Path
-        The file.
-    remedy : str
-        What makes a controller of a model, or another option, as a sentence.
-
-    Returns
-    -------
-    Controller
-        The controller.
-
-    Raises
-    ------
-    DataError
-        The file is another.
-    """
+    """Load a controller; a model is refused with what to do."""
     from ...control.controller.load import load_controller
     from ...identification.fitted.model_file import read_content
 
@@ -77,30 +43,7 @@ def only_controller(file: Path, remedy: str) -> Controller:
 def stage_of_controller(
     controller: Controller, stage: str | None, simulation: Simulation
 ) -> tuple[VirtualStage, IdentifiedModel | None]:
-    """Make the stage that a controller of a file drives.
-
-    Parameters
-    ----------
-    controller : Controller
-        The controller.
-    stage : str or None
-        A model file, or the name of the stage of the paper; by default the stage that the
-        feedforward inverts.
-    simulation : Simulation
-        Noise of its sensor, bandwidth of its amplifier, and seed of the noise.
-
-    Returns
-    -------
-    VirtualStage
-        The stage.
-    IdentifiedModel or None
-        That of the model file.
-
-    Raises
-    ------
-    ParameterError
-        There is no stage, or its drive has another unit than the controller's.
-    """
+    """Make the stage that a controller of a file drives."""
     from ...control.plant import plant_of_inverse
     from ...stages.virtual import VirtualStage
 

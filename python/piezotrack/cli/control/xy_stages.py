@@ -25,23 +25,7 @@ __all__ = ["ControllerStage", "OwnStage", "PaperStage", "controllers_in"]
 
 
 def controllers_in(files: Sequence[str]) -> tuple[Controller, Controller] | None:
-    """Load the controllers of x and y, or return None where the files are models.
-
-    Parameters
-    ----------
-    files : sequence of str
-        That of x and of y, or one for both, or none.
-
-    Returns
-    -------
-    tuple of two Controller or None
-        The controllers.
-
-    Raises
-    ------
-    ParameterError
-        One of the files is a controller and the other a model.
-    """
+    """Load the controllers of x and y, or return None where the files are models."""
     found = [controller_in(Path(file)) for file in files]
     known = [one for one in found if one is not None]
     if known and len(known) < len(found):

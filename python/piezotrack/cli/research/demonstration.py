@@ -66,13 +66,7 @@ class Demonstration:
 
 
 def demo_logs() -> tuple[Dataset, Dataset]:
-    """Load the two measured logs of the package, with the sensor set to 0 at the lowest reading.
-
-    Returns
-    -------
-    tuple of two Dataset
-        The log to identify, and the other.
-    """
+    """Load the two measured logs of the package, with the sensor set to 0 at the lowest reading."""
     first, other = datasets.dbo_training(), datasets.dbo_tracking()
     lowest = first[slice(*WINDOW)].y.min()
     log, other = (
@@ -87,18 +81,6 @@ def run_demo(seed: int = 1, *, progress: bool | None = None) -> Demonstration:
     The stage that is controlled is not the controller's model: it is identified from the other log,
     so that the feedforward is off by about as much as on the real stage, and has the noise of the
     measured sensor.
-
-    Parameters
-    ----------
-    seed : int, optional
-        Seed of the search and of the noise.
-    progress : bool, optional
-        As in `identify`.
-
-    Returns
-    -------
-    Demonstration
-        The model, its score, and the runs.
     """
     log, other = demo_logs()
     fit = identify(log[slice(*WINDOW)], method=Descents(seed=seed), progress=progress)
