@@ -365,7 +365,10 @@ def test_margins_that_no_gains_keep_are_refused_with_the_nearest() -> None:
 
 
 def test_a_gain_margin_far_out_of_reach_is_named_not_stability() -> None:
-    words = r"margins\.gain is 180 dB, a factor of 1e\+09: .* nearest gains reach \d+\.?\d* dB .* dB too low"
+    words = (
+        r"margins\.gain is 180 dB, a factor of 1e\+09: .* "
+        r"nearest gains reach \d+\.?\d* dB .* dB too low"
+    )
     with pytest.raises(pt.ParameterError, match=words):
         pt.tune(published_stage(), dt=0.02, limits=LIMITS, margins=pt.Margins(gain=1e9), **QUICK)
 
