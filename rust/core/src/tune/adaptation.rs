@@ -13,7 +13,7 @@ const CANDIDATES: usize = 12;
 /// Which of a run's streams it draws from.
 const STREAM: u64 = 1 << 40;
 /// Share by which the best of some generations is to improve for the search to go on.
-const LEAST_GAIN: f64 = 2e-3;
+const LEAST_GAIN: f64 = 5e-4;
 /// Widest step at which it ends, as a share of the box.
 const NARROW: f64 = 1e-4;
 

@@ -18,5 +18,5 @@ pub use judge::Judge;
 pub use loops::{ErrorSignal, ReadyTask, Task};
 pub use requirements::{PlantSet, Requirements, Robustness, Worst, check_margins};
 pub use run_metrics::RunMetrics;
-pub use search::{Aim, Found, Settings, SoughtController, Tuning};
-pub use settings::{Nominal, Setting, Sought, Structure, Template, pid};
+pub use search::{Aim, Found, SoughtController, Tuning};
+pub use settings::{Nominal, Setting, Settings, Sought, Structure, Template, pid};

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::judge::{Judge, Ready};
 use super::requirements::{PlantSet, Requirements, Robustness};
 use super::run_metrics::RunMetrics;
-use super::settings::{Setting, Sought, Template};
+use super::settings::{Setting, Settings, Sought, Template};
 use super::sides::{ROUNDS, Run, Side, Tried, agreeing};
 use crate::error::{Error, Result, not_negative, positive};
 use crate::parts::Law;
@@ -72,9 +72,6 @@ pub struct Tuning<'a> {
     /// Places of the unit box that one search begins with besides random ones.
     pub starts: Vec<Vec<f64>>,
 }
-
-/// Settings with their values.
-pub type Settings = Vec<(Setting, f64)>;
 
 /// Settings that were found.
 #[derive(Clone, Debug)]

@@ -47,6 +47,9 @@ pub enum Setting {
     Observer,
 }
 
+/// Settings with their values.
+pub type Settings = Vec<(Setting, f64)>;
+
 /// Which feedback law has the gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Structure {

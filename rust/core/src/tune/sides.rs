@@ -6,8 +6,7 @@ use super::adaptation::Adaptation;
 use super::evolution::Evolution;
 use super::requirements::Robustness;
 use super::run_metrics::RunMetrics;
-use super::search::Settings;
-use super::settings::Setting;
+use super::settings::{Setting, Settings};
 use crate::parts::Law;
 
 /// A candidate and what was found of it.
