@@ -311,7 +311,7 @@ def _of_reversals(drive: DriveFeatures) -> str:
 def _of_amplitudes(drive: DriveFeatures) -> list[str]:
     least, most = drive.swings
     if least >= (1.0 - 2.0 * SAME) * most:
-        return [f"one amplitude, {_drive(most, drive)}: minor loops cannot be predicted"]
+        return [f"one amplitude, {_drive(most, drive)}: minor loops are extrapolated from it"]
     if least > SMALL * most:
         return [
             f"amplitudes from {_drive(least, drive)} to {_drive(most, drive)} only: smaller loops "

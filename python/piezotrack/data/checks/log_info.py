@@ -298,7 +298,7 @@ def info(
     >>> found.drive.turns, round(1.0 / found.time.interval)
     (19, 100)
     >>> print(found.determines[1])
-    one amplitude, 60 V: minor loops cannot be predicted
+    one amplitude, 60 V: minor loops are extrapolated from it
     """
     log = Log(path, skip)
     given = {"time": time, "drive": drive, "displacement": displacement}
