@@ -7,7 +7,7 @@ __all__ = ["check_code"]
 COMMON = """\
 /*
  * Runs vectors.csv through NAME_step and prints the largest difference to what the controller of
- * piezotrack gives. Returns 0 where all are within the bound and all flags are equal.
+ * piezotrack gives. Returns 0 where all are within the bound and at most @flags flags differ.
  *
  *     cc -std=c99 -O2 -ffp-contract=off -o check check.c @file.c@link && ./check vectors.csv
  */
