@@ -14,6 +14,7 @@ use super::search::descents::{as_low_as, descend};
 use super::search::inertia::with_mass;
 use super::search::plan::{Method, Plan};
 use super::search::progress::{Monitor, Outcome, StopReason};
+use super::search::resolved::Resolved;
 use super::search::swarms::search;
 use crate::error::Result;
 use crate::integrator::Stepping;
@@ -111,6 +112,8 @@ pub fn identify_together(
             (found, true)
         }
     };
+    let resolved = Resolved::of(&records, stop);
+    resolved.leave_out(&mut runs);
     let ended = runs.iter().all(|run| run.reason != StopReason::Interrupted);
     // Descents that ended elsewhere are not refined.
     let lowest = runs.iter().fold(f64::INFINITY, |low, run| low.min(run.costs.rms));
@@ -123,6 +126,9 @@ pub fn identify_together(
         for run in runs.iter_mut().filter(|run| refined(run)) {
             let polished = local.polish(&run.place, run.costs);
             run.polish_evaluations = polished.evaluations;
+            if !resolved.holds(&polished.place, polished.costs.rms) {
+                continue;
+            }
             run.costs = polished.costs;
             run.theta = records.theta(&polished.place);
             run.place = polished.place;

@@ -18,6 +18,7 @@ use super::residual_sums::{Costs, Simulated};
 use crate::identify::parameters::candidate::{Candidate, DELAY, Point, Theta};
 use crate::identify::problem::Problem;
 use crate::identify::records::creep_weights::CreepWeights;
+use crate::integrator::Stepping;
 use crate::signal::{NEVER, Stop, index};
 
 /// Records with one problem, and what computes their costs.
@@ -83,6 +84,16 @@ impl<'a> Records<'a> {
         let evaluators = self.members.iter().zip(problems);
         let records = evaluators.map(|(one, problem)| one.evaluator.of(problem)).collect();
         Records::new(records).kept(self.journal.clone())
+    }
+
+    /// The same with steps half as long, and nothing kept.
+    pub(in crate::identify) fn finer(&self) -> Records<'a> {
+        let finer = |one: &Member<'a>| {
+            let Stepping { order, substeps } = one.evaluator.stepping;
+            let stepping = Stepping { order, substeps: 2 * substeps };
+            Evaluator::stepped(one.evaluator.record(), one.evaluator.problem(), stepping)
+        };
+        Records::new(self.members.iter().map(finer).collect())
     }
 
     /// The same with what is computed kept.

@@ -5,4 +5,5 @@ pub(super) mod descents;
 pub(super) mod inertia;
 pub(super) mod plan;
 pub(super) mod progress;
+pub(super) mod resolved;
 pub(super) mod swarms;
