@@ -96,7 +96,7 @@ def test_commands_take_the_zero(
     monkeypatch.chdir(tmp_path)
     fit.save("model.json")
     motion = ("triangle:1Hz,2..40um,2s", "--kp", "0.01", "--ti", "0.01")
-    assert "; --zero counts from" in refusal("track", "model.json", *motion)
+    assert "; --zero takes the beginning" in refusal("track", "model.json", *motion)
     assert "zeroed: -120 um subtracted" in ran("track", "model.json", *motion, "--zero")
     text = "triangle:1Hz,2..40um,2s"
     assert "--zero" in refusal("feedforward", "model.json", text)

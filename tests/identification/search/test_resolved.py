@@ -12,7 +12,7 @@ RATE = 250
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_cost_of_a_fit_is_the_error_of_its_motion(seed: int) -> None:
-    """Another kind of hysteresis, without noise: stiff candidates have a low cost by coarse steps."""
+    """Stiff candidates have a low cost by coarse steps where the hysteresis is of another kind."""
     t = np.arange(8 * RATE) / RATE
     u = 37.5 * (1 - np.cos(2 * np.pi * 0.25 * t))
     stage = pt.DahlStage.xu_li_2010()
