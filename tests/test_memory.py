@@ -87,8 +87,8 @@ TOO_MANY = {
     ),
     "particles": (
         "pt.identify(log, 'dahl', method=dataclasses.replace(swarm, runs=10_000))",
-        "ParameterError runs is 10000: expected 10 at most with 100000 particles in each: "
-        "1000000 together",
+        "ParameterError runs is 10000: expected 10 at most, with 100000 particles in each: "
+        "1000000 in all",
     ),
 }
 

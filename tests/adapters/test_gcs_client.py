@@ -114,7 +114,7 @@ def test_a_rate_is_a_whole_fraction_of_the_servo_clock(device: GcsDevice, rate: 
 def test_a_log_says_that_its_rate_was_rounded(device: GcsDevice) -> None:
     log = pt.measure(device, DRIVE, rate=3000.0)
     assert 1.0 / log.dt == pytest.approx(20e3 / 7)
-    assert any("2857.143 Hz obtained" in note for note in log.notes)
+    assert any("2857.143 Hz, requested" in note for note in log.notes)
 
 
 def test_a_table_longer_than_the_memory_is_refused_before_it_is_sent(device: GcsDevice) -> None:

@@ -83,7 +83,7 @@ def test_measure_identifies_the_stage_through_the_driver(
     log = pt.measure(device, "decaying:1Hz,0..70V,6s", rate=300.0)
     plain = pt.measure(stage(), "decaying:1Hz,0..70V,6s", rate=300.0)
     assert log.dt == pytest.approx(1.0 / (80e6 / 266667), rel=1e-12)
-    assert any("300" in note and "obtained" in note for note in log.notes)
+    assert any("300" in note and "requested" in note for note in log.notes)
     assert any("0.025 us" in note for note in log.notes)
     # The same seed, the same noise: the rates differ in the seventh digit.
     np.testing.assert_allclose(log.y - 5e-6, plain.y, atol=2e-7)

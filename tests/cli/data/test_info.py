@@ -77,7 +77,7 @@ def test_convert_takes_columns_and_units() -> None:
 
 def test_convert_says_what_contradicts_the_file() -> None:
     said = ran("convert", "log.csv", "out.npz", "--unit", "displacement=nm")
-    assert "note  column 'displacement_um' is taken in nm, as --unit says, where" in said
+    assert "note  column 'displacement_um': unit nm by --unit, um in the file" in said
 
 
 def test_convert_refuses_before_it_reads() -> None:
