@@ -38,7 +38,8 @@ def test_a_reference_below_the_settled_loop_is_told_how_far() -> None:
     with pytest.raises(
         pt.ParameterError,
         match=r"reference is 0 um at 1 s, 6\.68 um below 6\.679 um: expected "
-        r"displacements that the stage reaches at 0 V on the settled loop, from 60 um down, or beyond_reach=True",
+        r"displacements that the stage reaches at 0 V on the settled loop, from 60 um "
+        r"down, or beyond_reach=True",
     ):
         pt.track(REMANENT, controller, sine(1.0, 3.0, 0.0, 60 * UM))
     run = pt.track(REMANENT, controller, sine(1.0, 3.0, 0.0, 60 * UM), beyond_reach=True)
