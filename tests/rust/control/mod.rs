@@ -1,0 +1,16 @@
+//! Controllers, their loops, and the search for gains.
+
+mod antiwindup;
+mod closed_loop;
+mod contour;
+mod controller;
+mod controller_parts;
+mod design;
+mod hysteresis_observer;
+mod iterative_learning;
+mod metrics;
+mod online_feedforward;
+mod repetitive;
+mod scheduled_pid;
+mod tune;
+mod two_axes;

@@ -1,0 +1,7 @@
+//! Searches for the parameters of a stage.
+
+mod descents;
+mod relations;
+mod several_records;
+mod step;
+mod swarm;
