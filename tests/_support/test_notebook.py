@@ -1,4 +1,4 @@
-"""What a notebook shows: tables of results, and progress that leaves nothing."""
+"""Results in a notebook: tables, and progress that leaves nothing."""
 
 from __future__ import annotations
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 __all__ = [
+    "OTHER_UNITS",
     "Unit",
     "best_length_unit",
     "decibels",
@@ -90,6 +91,15 @@ _TABLE = (
     Unit("nm", "displacement", "m", divisor=1e9),
     Unit("pm", "displacement", "m", divisor=1e12),
 )
+# Units of references and loops, which no column of a log has.
+OTHER_UNITS = {
+    "Hz": Unit("Hz", "frequency", "Hz"),
+    "hz": Unit("Hz", "frequency", "Hz"),
+    "mHz": Unit("mHz", "frequency", "Hz", divisor=1e3),
+    "kHz": Unit("kHz", "frequency", "Hz", factor=1e3),
+    "rad": Unit("rad", "angle", "rad"),
+    "deg": Unit("deg", "angle", "rad", factor=math.pi, divisor=180.0),
+}
 _BY_NAME = {unit.name: unit for unit in _TABLE} | {
     other: unit for unit in _TABLE if unit.name == "um" for other in ("micron", "microns")
 }

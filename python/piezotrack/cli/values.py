@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .._support.units import lookup
+from .._support.units import OTHER_UNITS, lookup
 from ..errors import ParameterError
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class Quantity(ParamType):
     units : dict of str to float
         Units beside those of `quantity`, and their factors.
     quantity : str
-        Quantity of logs whose units are taken, as ``"time"``.
+        Quantity whose units are taken, as ``"time"``.
     bare : str
         Unit in which a number without one counts; empty where it has to have one.
     most_bare : float
@@ -117,7 +117,7 @@ class Quantity(ParamType):
             return Number.of(number, "")
         if unit in self.units:
             return Number.of(number * self.units[unit], unit)
-        known = lookup(unit) if self.quantity else None
+        known = (OTHER_UNITS.get(unit) or lookup(unit)) if self.quantity else None
         if known is None or known.quantity != self.quantity:
             raise ParameterError(option, f"'{text}'", self._expected, verb="has")
         return Number.of(number * known.factor / known.divisor, known.name)
@@ -133,9 +133,7 @@ TIME = Quantity("TIME", "as 2s or 20ms", "s", quantity="time")
 LOOP_TIME = Quantity("TIME", "as 20ms or 20s", "s", quantity="time", most_bare=1.0)
 LENGTH = Quantity("LENGTH", "as 20nm or 0.02um", quantity="displacement")
 VOLTAGE = Quantity("VOLTAGE", "as 5V", "V", quantity="voltage")
-FREQUENCY = Quantity(
-    "FREQUENCY", "as 200Hz or 1kHz", "Hz", {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3}
-)
+FREQUENCY = Quantity("FREQUENCY", "as 200Hz or 1kHz", "Hz", {"MHz": 1e6}, quantity="frequency")
 GAIN = Quantity(
     "GAIN",
     "as 0.03V/um",

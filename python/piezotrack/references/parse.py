@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .._support.arguments import expect
 from .._support.messages import quoted
-from .._support.units import Unit, known_units, lookup
+from .._support.units import OTHER_UNITS, Unit, known_units, lookup
 from ..errors import ParameterError
 from .paths import circle, lissajous, raster, spiral
 from .reference import Reference, read_reference
@@ -26,15 +25,6 @@ __all__ = ["parse_path", "parse_reference", "path_of", "reference_of"]
 # Length of a periodic reference where none is given, in periods.
 PERIODS = 4.0
 
-HERTZ = Unit("Hz", "frequency", "Hz")
-OTHER_UNITS = {
-    "Hz": HERTZ,
-    "hz": HERTZ,
-    "mHz": Unit("mHz", "frequency", "Hz", divisor=1e3),
-    "kHz": Unit("kHz", "frequency", "Hz", factor=1e3),
-    "rad": Unit("rad", "angle", "rad"),
-    "deg": Unit("deg", "angle", "rad", factor=math.pi, divisor=180.0),
-}
 UNITS = {"frequency": "Hz, mHz, kHz", "angle": "rad, deg", "number": "none"}
 UNITS |= {quantity: known_units(quantity) for quantity in ("time", "displacement", "voltage")}
 PLAIN = Unit("", "number", "")

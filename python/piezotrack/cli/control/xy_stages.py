@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,17 +34,19 @@ def controllers_in(files: Sequence[str]) -> tuple[Controller, Controller] | None
     return (known[0], known[-1]) if known else None
 
 
-class _Axes:
+class _Axes(ABC):
     """An XY stage of two stages, between the limits of its controllers."""
 
     name = ""
     words = "feedforward by the inverse of each"
 
+    @abstractmethod
     def _plants(self, simulation: Simulation) -> list[VirtualStage]:
-        raise NotImplementedError
+        """Make the stages of x and y."""
 
+    @abstractmethod
     def _limits(self) -> list[tuple[float, float]]:
-        raise NotImplementedError
+        """Return the limits of both controllers."""
 
     def stage(self, simulation: Simulation) -> XYStage:
         """Make the stage, with noise of its sensors and bandwidth of its amplifiers."""
