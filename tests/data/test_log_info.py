@@ -36,7 +36,7 @@ def sine(frequency: float, cycles: float, amplitude: float = 30.0) -> Array:
 
 
 def determined(report: pt.data.LogInfo) -> str:
-    return "\n".join(report.determines)
+    return "\n".join(map(str, report.determines))
 
 
 def test_a_sine_of_one_amplitude_and_rate(tmp_path: Path) -> None:
@@ -202,7 +202,7 @@ def test_the_document_has_what_the_words_have(tmp_path: Path) -> None:
     assert document["drive"]["turns"] == 9
     assert document["columns"][1]["unit"] == "V"
     assert document["problem"] is None
-    assert document["determines"] == list(report.determines)
+    assert document["determines"] == list(map(str, report.determines))
 
 
 def test_the_measured_log_says_what_it_is() -> None:

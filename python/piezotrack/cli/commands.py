@@ -23,6 +23,7 @@ HEADINGS = {
     "identify": ("identify", "compare", "step", "campaign", "watch", "suggest"),
     "control": ("simulate", "feedforward", "track", "tune", "learn", "contour", "export"),
     "device": ("measure", "play", "serve"),
+    "app": ("app",),
     "research": ("demo", "compare-controllers", "benchmark", "reproduce"),
 }
 COMMANDS = {name: heading for heading, names in HEADINGS.items() for name in names}

@@ -15,6 +15,7 @@ from ..arguments import expect, has_entries
 from ..messages import quoted
 from .fitting import ROOMS, place_legend, whole
 from .look import CHOSEN, drawing, look
+from .thinning import extremes
 from .wrapping import folded
 
 if TYPE_CHECKING:
@@ -278,20 +279,8 @@ def axes_or_new(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
 
 
 def thinned(values: Array) -> NDArray[np.intp]:
-    """Choose the samples to draw: of a long signal, the extrema of each part.
-
-    So a glitch of one sample stays visible.
-    """
-    stretch = max(1, values.size // (MOST_POINTS // 2))
-    if stretch < 3:
-        return np.arange(values.size)
-    whole = values.size // stretch * stretch
-    rows = values[:whole].reshape(-1, stretch)
-    first = np.arange(0, whole, stretch)
-    extremes = np.stack([first + rows.argmin(axis=1), first + rows.argmax(axis=1)])
-    ends = [0, values.size - 1]
-    tail = np.arange(whole, values.size)
-    return np.unique(np.concatenate([extremes.ravel(), tail, ends]))
+    """Choose the samples of a signal to draw, as `extremes` does."""
+    return extremes(values, MOST_POINTS)
 
 
 def trace(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -20,10 +20,11 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 __all__ = [
+    "Determination",
     "DriveFeatures",
     "TimeFeatures",
+    "determinations",
     "drive_features",
-    "drive_notes",
     "reversals_text",
     "time_features",
 ]
@@ -42,6 +43,27 @@ SMALL, DECADE = 0.5, 10.0
 HIGHEST = 0.45
 # Times the noise that a motion has to be to show.
 VISIBLE = 3.0
+
+
+class Determination(NamedTuple):
+    """Whether a record determines a property of the stage.
+
+    Attributes
+    ----------
+    subject : {"record", "loop", "minor loops", "rate", "mode", "creep"}
+        The property; ``"record"`` for what holds for all of them.
+    verdict : {"yes", "partly", "no"}
+        Whether the record determines it.
+    text : str
+        That in words, with numbers; it is what is printed.
+    """
+
+    subject: Literal["record", "loop", "minor loops", "rate", "mode", "creep"]
+    verdict: Literal["yes", "partly", "no"]
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
 
 
 @dataclass(frozen=True)
@@ -245,8 +267,10 @@ def _mode_limit(t: Array, y: Array | None, shares: Array, lasting: Array, steps:
     return min(HIGHEST * rate, float(known.max())) if known.size else 0.0
 
 
-def drive_notes(time: TimeFeatures, drive: DriveFeatures, stroke: float | None) -> list[str]:
-    """Say in words which models a record can determine.
+def determinations(
+    time: TimeFeatures, drive: DriveFeatures, stroke: float | None
+) -> list[Determination]:
+    """Return which properties of a stage a record determines.
 
     Parameters
     ----------
@@ -259,18 +283,21 @@ def drive_notes(time: TimeFeatures, drive: DriveFeatures, stroke: float | None) 
 
     Returns
     -------
-    list of str
-        Sentences.
+    list of Determination
+        One for each property, or one on the record where it determines none.
     """
+    nothing = ""
     if stroke is None:
-        return ["no displacement: a drive to simulate a model with (piezotrack simulate)"]
-    if drive.high == drive.low:
-        return [
+        nothing = "no displacement: a drive to simulate a model with (piezotrack simulate)"
+    elif drive.high == drive.low:
+        nothing = (
             f"the drive stands at {_drive(drive.high, drive)}: no model of the stage; the noise of "
             "the sensor (piezotrack noise)"
-        ]
-    if stroke == 0.0:
-        return ["the displacement never changes: no model, is the sensor connected?"]
+        )
+    elif stroke == 0.0:
+        nothing = "the displacement never changes: no model, is the sensor connected?"
+    if nothing:
+        return [Determination("record", "no", nothing)]
     return [
         *_of_time(time),
         _of_reversals(drive),
@@ -281,80 +308,96 @@ def drive_notes(time: TimeFeatures, drive: DriveFeatures, stroke: float | None) 
     ]
 
 
-def _of_time(time: TimeFeatures) -> list[str]:
+def _of_time(time: TimeFeatures) -> list[Determination]:
     if time.backward:
-        return [f"the time does not increase at {time.backward} samples: no model before it does"]
+        words = f"the time does not increase at {time.backward} samples: no model before it does"
+        return [Determination("record", "no", words)]
     if time.gaps or time.jitter > 0.05 * time.interval:
-        return [
+        words = (
             "the samples are not evenly spaced: read it with resample=, or with dt= where only the "
             "times are coarse"
-        ]
+        )
+        return [Determination("record", "no", words)]
     return []
 
 
-def _of_reversals(drive: DriveFeatures) -> str:
+def _of_reversals(drive: DriveFeatures) -> Determination:
     if drive.turns >= 2:
-        return (
+        return Determination(
+            "loop",
+            "yes",
             f"the loop between {_drive(drive.low, drive)} and {_drive(drive.high, drive)}: any "
-            "model of hysteresis"
+            "model of hysteresis",
         )
     if drive.turns == 1:
-        return (
+        return Determination(
+            "loop",
+            "partly",
             "one reversal: the loop is not closed, and a model of hysteresis may not hold for the "
-            "part that is not there"
+            "part that is not there",
         )
+    words = "no reversal: no hysteresis; the gain only"
     if drive.steps:
-        return "no reversal: no hysteresis; gain, lag and mode from the step (piezotrack step)"
-    return "no reversal: no hysteresis; the gain only"
+        words = "no reversal: no hysteresis; gain, lag and mode from the step (piezotrack step)"
+    return Determination("loop", "no", words)
 
 
-def _of_amplitudes(drive: DriveFeatures) -> list[str]:
+def _of_amplitudes(drive: DriveFeatures) -> list[Determination]:
     least, most = drive.swings
     if least >= (1.0 - 2.0 * SAME) * most:
-        return [f"one amplitude, {_drive(most, drive)}: minor loops are extrapolated from it"]
+        words = f"one amplitude, {_drive(most, drive)}: minor loops are extrapolated from it"
+        return [Determination("minor loops", "no", words)]
+    between = f"amplitudes from {_drive(least, drive)} to {_drive(most, drive)}"
     if least > SMALL * most:
-        return [
-            f"amplitudes from {_drive(least, drive)} to {_drive(most, drive)} only: smaller loops "
-            "are not in it"
-        ]
-    return [
-        f"amplitudes from {_drive(least, drive)} to {_drive(most, drive)}: smaller loops too, "
-        "models of plays (prandtl-ishlinskii) in full"
-    ]
+        words = f"{between} only: smaller loops are not in it"
+        return [Determination("minor loops", "partly", words)]
+    words = f"{between}: smaller loops too, models of plays (prandtl-ishlinskii) in full"
+    return [Determination("minor loops", "yes", words)]
 
 
-def _of_frequencies(drive: DriveFeatures, time: TimeFeatures) -> list[str]:
+def _of_frequencies(drive: DriveFeatures, time: TimeFeatures) -> list[Determination]:
     if not drive.frequencies:
         return []
     least, most = drive.frequencies
     if most < 2.0 * least:
         # A rest shows creep.
         what = "lag, delay" if _longest_rest(time, drive) else "lag, delay, creep"
-        return [f"one rate, {most:.3g} Hz: {what} and hysteresis cannot be distinguished"]
-    known = "lag and delay can" if most >= DECADE * least else "a lag can partly"
-    return [f"rates from {least:.3g} Hz to {most:.3g} Hz: {known} be distinguished from hysteresis"]
+        words = f"one rate, {most:.3g} Hz: {what} and hysteresis cannot be distinguished"
+        return [Determination("rate", "no", words)]
+    apart = most >= DECADE * least
+    known = "lag and delay can" if apart else "a lag can partly"
+    words = f"rates from {least:.3g} Hz to {most:.3g} Hz: {known} be distinguished from hysteresis"
+    return [Determination("rate", "yes" if apart else "partly", words)]
 
 
-def _of_mode(time: TimeFeatures, drive: DriveFeatures) -> str:
+def _of_mode(time: TimeFeatures, drive: DriveFeatures) -> Determination:
     rate = 1.0 / time.interval if time.interval > 0.0 else math.nan
     limit = f"{drive.mode_limit:.3g} Hz"
     if drive.steps:
-        return f"steps: a mode up to {limit}, 0.45 of the sampling rate"
+        words = f"steps: a mode up to {limit}, 0.45 of the sampling rate"
+        return Determination("mode", "yes", words)
     if drive.mode_limit >= HIGHEST * rate * (1.0 - 1e-9):
-        return f"fast enough for a mode up to {limit}, 0.45 of the sampling rate"
+        words = f"fast enough for a mode up to {limit}, 0.45 of the sampling rate"
+        return Determination("mode", "yes", words)
     if drive.mode_limit == 0.0:
-        return "too slow for a mode: record steps or a chirp through it"
-    return f"a mode up to about {limit} would show above the noise; for a higher one record steps"
+        words = "too slow for a mode: record steps or a chirp through it"
+        return Determination("mode", "no", words)
+    words = (
+        f"a mode up to about {limit} would show above the noise; for a higher one record steps"
+    )
+    return Determination("mode", "partly", words)
 
 
-def _of_rests(time: TimeFeatures, drive: DriveFeatures) -> str:
+def _of_rests(time: TimeFeatures, drive: DriveFeatures) -> Determination:
     longest = _longest_rest(time, drive)
     if not longest:
-        return (
+        words = (
             "no rests after the first motion: creep and hysteresis cannot be distinguished; record "
             "a step and a hold of minutes"
         )
-    return f"the drive rests for up to {longest:.3g} s: creep with time constants up to that"
+        return Determination("creep", "no", words)
+    words = f"the drive rests for up to {longest:.3g} s: creep with time constants up to that"
+    return Determination("creep", "yes", words)
 
 
 def _longest_rest(time: TimeFeatures, drive: DriveFeatures) -> float:

@@ -22,10 +22,11 @@ from ..missing import checked_missing, complete
 from ..reader import USE_RESAMPLE, Log
 from .connections import unusual_connection
 from .drive_features import (
+    Determination,
     DriveFeatures,
     TimeFeatures,
+    determinations,
     drive_features,
-    drive_notes,
     reversals_text,
     time_features,
 )
@@ -100,8 +101,8 @@ class LogInfo:
         What its drive does; None where the drive is not known.
     stroke : float or None
         Range of the displacement [m]; None where it is not known.
-    determines : tuple of str
-        Sentences on the models that it can determine.
+    determines : tuple of Determination
+        Properties of the stage that it can determine, or not.
     notes : tuple of str
         What a person should know of the file.
     """
@@ -114,7 +115,7 @@ class LogInfo:
     time: TimeFeatures | None
     drive: DriveFeatures | None
     stroke: float | None
-    determines: tuple[str, ...]
+    determines: tuple[Determination, ...]
     notes: tuple[str, ...]
 
     def __repr__(self) -> str:
@@ -128,7 +129,7 @@ class LogInfo:
         rows = [
             *((f"column of the {role}", title) for role, title in self.roles.items()),
             *(line.split("  ", 1) for line in [*self._of_time(), *self._of_drive()]),
-            *(("can determine", one) for one in self.determines),
+            *(("can determine", one.text) for one in self.determines),
             *(("note", note) for note in self.notes),
             *([("not read as it is", self.problem)] if self.problem else []),
         ]
@@ -156,7 +157,7 @@ class LogInfo:
         ]
         lines += ["", *self._of_time(), *self._of_drive()]
         if self.determines:
-            lines += ["", "can determine", *(f"  {text}" for text in self.determines)]
+            lines += ["", "can determine", *(f"  {one}" for one in self.determines)]
             if self.drive is not None and self.drive.turns and self.stroke:
                 lines.append(
                     "  for the drive to record next, with a first model: piezotrack suggest"
@@ -211,7 +212,7 @@ class LogInfo:
             "time": None if self.time is None else asdict(self.time),
             "drive": None if self.drive is None else asdict(self.drive),
             "stroke": {"value": self.stroke, "unit": "m"},
-            "determines": list(self.determines),
+            "determines": [one.text for one in self.determines],
             "notes": list(self.notes),
         }
 
@@ -344,13 +345,15 @@ def info(
     spare: list[str] = []
     if times is not None and u is not None and y is not None and not problems:
         spare = sampling_notes(u, times.interval, 0.0 if features is None else features.mode_limit)
-    sentences: list[str] = []
+    determined: list[Determination] = []
     if connection is not None and not connection.follows:
-        sentences = ["no model: drive and displacement are not correlated, see the note"]
+        words = "no model: drive and displacement are not correlated, see the note"
+        determined = [Determination("record", "no", words)]
     elif times is not None and features is not None:
-        sentences = drive_notes(times, features, stroke)
+        determined = determinations(times, features, stroke)
     elif stroke is not None and problems and problems[0].startswith(NO_DRIVE):
-        sentences = ["no drive: the noise of a sensor at rest (piezotrack noise), or a reference"]
+        words = "no drive: the noise of a sensor at rest (piezotrack noise), or a reference"
+        determined = [Determination("record", "no", words)]
     notes = far_notes(t, y, far) if t is not None and y is not None and far is not None else []
     notes += [] if connection is None else [connection.note]
     return LogInfo(
@@ -362,7 +365,7 @@ def info(
         time=times,
         drive=features,
         stroke=stroke,
-        determines=tuple(sentences),
+        determines=tuple(determined),
         notes=(*log.columns.notes, *lost, *notes, *spare),
     )
 
