@@ -7,20 +7,22 @@ import shutil
 import tempfile
 import threading
 from collections import OrderedDict
+from copy import copy
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from ..errors import DataError, PiezotrackError
-from .parts import Plotter
+from .parts import Plotter, message, messages
 from .state import State
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from .parts import Box, Light, Part
+    from ..control.controller.controller import Controller
+    from .parts import Light, Part
 
-__all__ = ["Desk", "Download", "Job", "Purpose", "Step"]
+__all__ = ["Desk", "Download", "Job", "Purpose", "Same", "Step"]
 
 # Results that are kept, the last used ones.
 KEPT = 64
@@ -93,6 +95,13 @@ class Job:
             self.changed()
 
 
+@dataclass(frozen=True)
+class Same:
+    """An object that a result depends on, by its identity."""
+
+    value: object
+
+
 class Desk:
     """State, files and results of a window.
 
@@ -109,22 +118,36 @@ class Desk:
         What the person has set.
     plotter : Plotter
         Thins lines to the pixels of the window.
-    job : Job or None
-        What is computed in the background.
+    jobs : dict of str to Job
+        What is or was computed in the background, by name.
+    suggested : tuple or None
+        The drive to record next, with the log that it is for.
+    last_tuned, accepted : Controller or None
+        The controller of the last search, and the one that the person accepted.
+    tuned_for : object
+        Settings that the last search was for.
     """
 
     def __init__(self, changed: Callable[[], None], device: str | None = None) -> None:
         self.state = State()
         self.plotter = Plotter(800, {})
         self.device = device
-        # The drive to record next, with the log that it is for.
         self.suggested: Any = None
-        self.job: Job | None = None
+        self.last_tuned: Controller | None = None
+        self.accepted: Controller | None = None
+        self.tuned_for: object = None
+        self.jobs: dict[str, Job] = {}
         self._changed = changed
         self._folder = Path(tempfile.mkdtemp(prefix="piezotrack-"))
         self._files: dict[Purpose, Path] = {}
-        self._results: OrderedDict[str, Any] = OrderedDict()
+        self._results: OrderedDict[str, tuple[Any, list[object]]] = OrderedDict()
         self._lock = threading.Lock()
+
+    def at(self, state: State) -> Desk:
+        """Return the desk as it is, but for its state: for a computation in the background."""
+        same = copy(self)
+        same.state = state
+        return same
 
     def close(self) -> None:
         """Stop what runs, and remove the files."""
@@ -190,7 +213,7 @@ class Desk:
         name : str
             Which result.
         settings : object
-            What it depends on: dataclasses, numbers and texts.
+            What it depends on: dataclasses, numbers, texts, and objects as `Same`.
         compute : callable
             Computes it.
 
@@ -199,29 +222,57 @@ class Desk:
         object
             As `compute` returns it.
         """
-        key = name + json.dumps(settings, default=asdict, sort_keys=True)
+        key, kept = _key(name, settings)
         with self._lock:
             if key in self._results:
                 self._results.move_to_end(key)
-                return self._results[key]
+                return self._results[key][0]
         found = compute()
         with self._lock:
-            self._results[key] = found
+            self._results[key] = found, kept
             while len(self._results) > KEPT:
                 self._results.popitem(last=False)
         return found
 
+    def known(self, name: str, settings: Any) -> Any:
+        """Return a result that was computed before; None where it was not."""
+        with self._lock:
+            found = self._results.get(_key(name, settings)[0])
+        return None if found is None else found[0]
+
     def start(self, name: str, work: Callable[[Job], None]) -> None:
-        """Begin a long computation, in place of the one that runs."""
-        self.stop()
-        self.job = job = Job(name, self._changed)
+        """Begin a long computation, in place of the last one of that name."""
+        if name in self.jobs:
+            self.jobs[name].stop.set()
+        self.jobs[name] = job = Job(name, self._changed)
         threading.Thread(target=job.run, args=(work,), daemon=True, name=name).start()
 
     def stop(self) -> None:
         """End what is computed in the background, at its next iteration."""
-        if self.job is not None:
-            self.job.stop.set()
+        for job in self.jobs.values():
+            job.stop.set()
 
-    def running(self, name: str) -> bool:
-        """Whether a computation runs."""
-        return self.job is not None and self.job.name == name and not self.job.done
+    @property
+    def running(self) -> list[str]:
+        """Names of what is computed in the background."""
+        return [name for name, job in self.jobs.items() if not (job.done or job.stop.is_set())]
+
+    def faults(self, name: str) -> list[Part]:
+        """Return why a computation failed, as a part of the page; nothing where it did not."""
+        job = self.jobs.get(name)
+        if job is None or not job.error:
+            return []
+        return [messages(f"{name}-fault", message("red", job.error))]
+
+
+def _key(name: str, settings: Any) -> tuple[str, list[object]]:
+    """Return the key of a result, and the objects in it, which live as long as the result."""
+    kept: list[object] = []
+
+    def entry(value: Any) -> Any:
+        if isinstance(value, Same):
+            kept.append(value.value)
+            return id(value.value)
+        return asdict(value)
+
+    return name + json.dumps(settings, default=entry, sort_keys=True), kept

@@ -36,7 +36,9 @@ __all__ = [
     "lights",
     "message",
     "messages",
+    "needs",
     "number",
+    "points",
     "region",
     "select",
     "slider",
@@ -95,12 +97,16 @@ class Plotter:
         Part
             A line.
         """
-        if (box := self.zoom.get(chart)) is not None:
-            first, last = np.searchsorted(t, box[:2])
-            part = slice(max(int(first) - 1, 0), int(last) + 1)
-            t, values = t[part], values[part]
-        kept = extremes(values, 2 * self.width)
+        kept = self.kept(chart, t, values)
         return _line(t[kept], values[kept], name, role, style)
+
+    def kept(self, chart: str, t: Array, values: Array) -> NDArray[np.intp]:
+        """Return the samples of a signal that `over_time` draws."""
+        first, last = 0, t.size
+        if (box := self.zoom.get(chart)) is not None:
+            inside = np.searchsorted(t, box[:2])
+            first, last = max(int(inside[0]) - 1, 0), min(int(inside[1]) + 1, t.size)
+        return first + extremes(values[first:last], 2 * self.width)
 
     def in_plane(
         self, chart: str, x: Array, y: Array, name: str, role: str, **style: Any
@@ -135,9 +141,18 @@ def band(x: ArrayLike, low: ArrayLike, high: ArrayLike, name: str, role: str) ->
     return {"name": name, "role": role, "x": packed(x), "y": packed(low), "to": packed(high)}
 
 
-def region(first: float, last: float, label: str, role: str, axis: str = "x") -> Part:
+def region(
+    first: float, last: float, label: str, role: str, axis: str = "x", *, hatched: bool = False
+) -> Part:
     """Mark a range of an axis, over the whole of the other one."""
-    return {"from": first, "to": last, "label": label, "role": role, "axis": axis}
+    return {
+        "from": first,
+        "to": last,
+        "label": label,
+        "role": role,
+        "axis": axis,
+        "hatched": hatched,
+    }
 
 
 def chart(
@@ -191,6 +206,11 @@ def buttons(key: str, *items: Part) -> Part:
     return {"kind": "buttons", "id": key, "items": list(items)}
 
 
+def needs(step: str, words: str) -> Part:
+    """Make the button that leads to the step that has to come before."""
+    return buttons("needs", action(words, "go", to=step, primary=True))
+
+
 def message(level: Light, sentence: str, *fixes: Part) -> Part:
     """Make a sentence of the library with the buttons that mend its cause."""
     return {"level": level, "text": sentence, "fixes": list(fixes)}
@@ -218,9 +238,13 @@ def table(key: str, title: str, columns: Sequence[str], rows: Sequence[Sequence[
     }
 
 
-def cards(key: str, title: str, *items: Part) -> Part:
-    """Make cards to choose from; each has ``name``, ``value``, ``text``, ``light`` and ``share``."""
-    return {"kind": "cards", "id": key, "title": title, "items": list(items)}
+def cards(key: str, title: str, *items: Part, step: str) -> Part:
+    """Make cards to choose from.
+
+    Each has ``title``, ``light``, ``value`` and ``text``; ``share`` and ``mark`` of its bar, and the
+    settings of the step that it chooses, ``choose``.
+    """
+    return {"kind": "cards", "id": key, "title": title, "items": list(items), "step": step}
 
 
 def code(key: str, title: str, lines: str) -> Part:

@@ -228,7 +228,7 @@ class Session:
             "link": desk.state.link(),
             "undo": bool(self._past),
             "redo": bool(self._future),
-            "running": "" if desk.job is None or desk.job.done else desk.job.name,
+            "running": ", ".join(desk.running),
         }
 
 

@@ -47,6 +47,8 @@ class LogState:
         As of `piezotrack.read` [s].
     decimate : int
         As of `Dataset.decimate`.
+    zero : bool
+        Whether displacements count from the first reading.
     window : (float, float) or None
         Part that is used [s]; None for all of it.
     """
@@ -60,6 +62,7 @@ class LogState:
     missing: Literal["drop", "fill"] | None = None
     resample: float | None = None
     decimate: int = 1
+    zero: bool = False
     window: Span | None = None
 
 
@@ -75,8 +78,14 @@ class ModelState:
         Name of the second log; empty without one.
     chosen : str
         Model that the next steps use; empty for the one with the least error on the test.
-    creep, drift : bool or None
+    test_from : float
+        Time of the second log from which it is the test [s].
+    history : str or None
         As of `piezotrack.identify`; None for what the record shows.
+    delay : bool
+        Whether a delay is fitted.
+    drift : bool or None
+        Whether a drift is fitted; None for what the record shows.
     seed : int
         Seed of the searches.
     """
@@ -84,7 +93,9 @@ class ModelState:
     share: float = 0.6
     test: str = ""
     chosen: str = ""
-    creep: bool | None = None
+    test_from: float = 0.0
+    history: Literal["virgin", "settled", "fit"] | None = None
+    delay: bool = False
     drift: bool | None = None
     seed: int = 0
 
@@ -125,13 +136,14 @@ class LoopState:
     Attributes
     ----------
     speed : float
-        From slow, 0, to fast, 1: the share of the error in what is made small, beside the effort.
+        From slow, 0, to fast, 1: how little a change of the command counts beside the error.
     robustness : float
         From aggressive, 0, to robust, 1: which sensitivity is kept.
     kp, ki, kd : float or None
-        Gains [V/m, V/(m s), V s/m]; None for those of the last search.
+        Gains [V/m, V/(m s), V s/m]; None for those of the search.
     low_pass, notch : float or None
-        Cut-off frequency of the low-pass and centre of the notch [Hz]; None without one.
+        Cut-off frequency of the low-pass and centre of the notch [Hz]; None for that of the search,
+        0 for none.
     repetitive : bool
         Whether what repeats is learnt.
     delay : float
@@ -141,7 +153,7 @@ class LoopState:
     spread : float
         Share by which the gain of the stage may differ.
     second : bool
-        Whether the stage is the second log's, not that of the model.
+        Whether the stage is that of the second log, not that of the model.
     """
 
     speed: float = 0.5

@@ -108,6 +108,7 @@ function controls(part, send) {
     made.dataset.name = item.name;
     group.append(made);
   }
+  for (const one of part.buttons ?? []) group.append(button(one, send));
   if (!part.folded) return element("section", {}, ...heading(part), group);
   return element("details", {}, element("summary", { textContent: part.title }), group);
 }
@@ -141,13 +142,19 @@ function cards(part, send) {
     const card = element("button", { type: "button", className: "card" },
       element("strong", {}, lamp(one.light), one.title), element("span", { className: "value", textContent: one.value }),
       element("small", { textContent: one.text }));
-    if (one.share !== undefined) card.append(element("meter", { min: 0, max: 1, value: one.share }));
+    if (one.share !== undefined) {
+      const [fill, mark] = [element("i"), element("b")];
+      fill.style.width = `${100 * one.share}%`;
+      mark.style.left = `${100 * one.mark}%`;
+      card.append(element("span", { className: "bar" }, fill, mark));
+    }
     card.setAttribute("aria-pressed", String(Boolean(one.chosen)));
     card.disabled = !one.choose;
     card.onclick = () => send({ do: "set", step: part.step, values: one.choose });
     return card;
   });
-  return element("section", {}, ...heading(part), element("div", { className: "cards" }, ...items));
+  return element("section", {}, ...heading(part), element("div", { className: "cards" }, ...items),
+    element("div", { className: "row" }, ...(part.buttons ?? []).map((one) => button(one, send))));
 }
 
 function code(part) {

@@ -262,6 +262,10 @@ export class Chart {
       g.restore();
       return;
     }
+    if (line.dots) {
+      for (let i = 0; i < line.x.length; i++) g.fillRect(this.x(line.x[i]) - 0.7, this.y(line.y[i]) - 0.7, 1.4, 1.4);
+      return;
+    }
     if (line.marks) {
       for (let i = 0; i < line.x.length; i++) {
         g.beginPath();

@@ -18,7 +18,7 @@ from ...identification.confidence.suggestion.suggested_drive import suggest_driv
 from ...identification.fit import identify
 from .. import parts
 from ..code import call, command, given, plain
-from ..desk import Download
+from ..desk import Download, Same
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["LogStep", "columns_of", "info_of", "record_of", "window_of"]
+__all__ = ["LogStep", "columns_of", "info_of", "log_options", "record_of", "stamp", "window_of"]
 
 COLOURS: dict[str, Light] = {"yes": "green", "partly": "amber", "no": "red"}
 # Titles of the lights, in their order.
@@ -73,12 +73,12 @@ def info_of(desk: Desk) -> LogInfo:
     """Describe the log that is open."""
     state = desk.state.log
     path = desk.file("log", state.source)
-    settings = [str(path), _stamp(path), columns_of(state)]
+    settings = [str(path), stamp(path), columns_of(state)]
     found: LogInfo = desk.result("info", settings, lambda: info(path, **columns_of(state)))
     return found
 
 
-def _stamp(path: Any) -> float:
+def stamp(path: Any) -> float:
     """Distinguish files of one name that were opened one after the other."""
     return float(path.stat().st_mtime_ns)
 
@@ -90,9 +90,10 @@ def record_of(desk: Desk) -> Dataset:
 
     def compute() -> Dataset:
         log = read(path, **columns_of(state), resample=state.resample)
-        return log if state.decimate <= 1 else log.decimate(state.decimate)
+        log = log if state.decimate <= 1 else log.decimate(state.decimate)
+        return log.zeroed() if state.zero else log
 
-    found: Dataset = desk.result("record", [_stamp(path), state], compute)
+    found: Dataset = desk.result("record", [stamp(path), state], compute)
     return found
 
 
@@ -175,6 +176,8 @@ class LogStep:
         lines = ["import piezotrack as pt", "", reading]
         if state.decimate > 1:
             lines.append(f"log = log.decimate({state.decimate})")
+        if state.zero:
+            lines.append("log = log.zeroed()")
         if state.window is not None:
             first, last = state.window
             lines.append(f"log = log[{plain(first)}:{plain(last)}]")
@@ -210,6 +213,7 @@ def log_options(state: LogState) -> dict[str, Any]:
         **_reading(state),
         "resample": None if state.resample is None else f"{plain(state.resample)}s",
         "decimate": state.decimate if state.decimate > 1 else None,
+        "zero": state.zero,
         "window": None if window is None else f"{plain(window[0])}:{plain(window[1])}",
     }
 
@@ -222,8 +226,9 @@ def _example(desk: Desk, _: Mapping[str, Any]) -> None:
     ):
         content = log.save(desk.place("example") / name).read_bytes()
         desk.keep(purpose, name, content)  # type: ignore[arg-type]
+    # The first three seconds of both are a transient of an unknown history.
     state = desk.state.changed("log", {"source": "training.csv", "window": (3.0, 23.0)})
-    desk.state = state.changed("model", {"test": "tracking.csv"})
+    desk.state = state.changed("model", {"test": "tracking.csv", "test_from": 3.0})
 
 
 def _columns(state: LogState, found: LogInfo) -> Part:
@@ -265,6 +270,7 @@ def _columns(state: LogState, found: LogInfo) -> Part:
             [(None, "refuse"), ("drop", "leave out"), ("fill", "interpolate")],
         )
     )
+    items.append(parts.check("zero", "Count from the first reading", state.zero))
     items.append(parts.number("dt", "Interval, where there are no times", state.dt, "s"))
     title = f"{found.source}: {found.format}, {len(found.columns)} columns"
     return parts.controls("columns", title, *items, step="log")
@@ -338,7 +344,7 @@ def _drive_chart(desk: Desk, found: LogInfo, log: Dataset, part: Dataset) -> Par
     window = desk.state.log.window or (float(log.t[0]), float(log.t[-1]))
     line = desk.result(
         "drive line",
-        [id(log), desk.plotter.width, desk.plotter.zoom.get("drive")],
+        [Same(log), desk.plotter.width, desk.plotter.zoom.get("drive")],
         lambda: desk.plotter.over_time("drive", log.t, scale * log.u, "drive", "drive"),
     )
     regions = []
@@ -412,13 +418,13 @@ def _next(desk: Desk, part: Dataset) -> list[Part]:
     drive = desk.suggested
     if drive is None or drive[0] != desk.state.log:
         label = "Suggest what to record next"
-        running = desk.running("suggestion")
+        running = "suggestion" in desk.running
         return [
             parts.buttons(
                 "suggest",
                 parts.action("Stop", "stop") if running else parts.action(label, "log.suggest"),
             ),
-            *_job_error(desk, "suggestion"),
+            *desk.faults("suggestion"),
         ]
     found: SuggestedDrive = drive[1]
     unit, scale = shown_unit(found.drive_unit)
@@ -430,13 +436,6 @@ def _next(desk: Desk, part: Dataset) -> list[Part]:
         parts.chart("next", "Record this next", words, ("time", "s"), ("drive", unit), [line]),
         parts.buttons("next-file", parts.action("Drive as CSV", "log.suggested")),
     ]
-
-
-def _job_error(desk: Desk, name: str) -> list[Part]:
-    job = desk.job
-    if job is None or job.name != name or not job.error:
-        return []
-    return [parts.messages(f"{name}-fault", parts.message("red", job.error))]
 
 
 def _suggest(desk: Desk, _: Mapping[str, Any]) -> None:

@@ -39,6 +39,10 @@ def tune_command(
         Option("Error to minimise, or the effort within --largest-error"),
     ] = "rms",
     largest_error: Annotated[float | None, Option("Largest rms error, as 20nm", LENGTH)] = None,
+    effort: Annotated[
+        float,
+        Option("Error that a change of the command of 1 V rms from sample to sample is worth", LENGTH),
+    ] = 0.0,
     gain_margin: Annotated[float, Option("Least gain margin", DECIBELS)] = 6.0,
     phase_margin: Annotated[float, Option("Least phase margin", DEGREES)] = 30.0,
     sensitivity: Sensitivity = 2.0,
@@ -104,6 +108,7 @@ def tune_command(
         spread=Spread(delay=(0.0, delay_spread), mode=0.01 * mode_spread, gain=0.01 * gain_spread),
         goal=Goal(
             minimise=minimise,
+            effort=effort,
             largest_error=math.inf if largest_error is None else largest_error,
         ),
         timing=simulation.timing,

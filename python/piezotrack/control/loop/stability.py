@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import expect, not_negative
+from ..._support.arguments import expect, not_negative, one_of
 from ..._support.display.result import Result
 from ..._support.units import decibels, shown_unit
 from ...errors import ParameterError
@@ -31,6 +31,8 @@ __all__ = ["LoopCheck", "LoopReport", "LoopResponse", "check_loop"]
 
 # Frequencies of the grids, each within an interval of the one before, that find the bandwidth.
 GRIDS = (150, 40, 40)
+Gain = Literal["low", "middle", "high"]
+GAINS: tuple[Gain, ...] = ("low", "middle", "high")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,8 +189,8 @@ class LoopReport(Result):
         The controller.
     low, middle, high : LoopCheck
         Stability at these gains.
-    plant : LoopPlant
-        The stage linearised at the middle gain, as an object of the core.
+    plants : tuple of LoopPlant
+        The stage linearised at these gains, as objects of the core.
     """
 
     views: ClassVar[Mapping[str, str]] = {
@@ -200,7 +202,7 @@ class LoopReport(Result):
     low: LoopCheck
     middle: LoopCheck
     high: LoopCheck
-    plant: _core.LoopPlant
+    plants: tuple[_core.LoopPlant, ...]
 
     @property
     def stable(self) -> bool:
@@ -232,7 +234,7 @@ class LoopReport(Result):
         return (self.controller,)
 
     @property
-    def cases(self) -> tuple[tuple[str, LoopCheck], ...]:
+    def cases(self) -> tuple[tuple[Gain, LoopCheck], ...]:
         """Name and stability at each gain."""
         return ("low", self.low), ("middle", self.middle), ("high", self.high)
 
@@ -247,13 +249,17 @@ class LoopReport(Result):
         law = {"by": "check_loop"} | ({"antiwindup": "held state"} if self.holds_state else {})
         return law | {name: case.margins() for name, case in self.cases}
 
-    def response(self, count: int = 400) -> LoopResponse:
-        """Frequency response at the middle gain, up to half the sampling rate.
+    def response(
+        self, count: int = 400, *, gain: Gain = "middle"
+    ) -> LoopResponse:
+        """Frequency response up to half the sampling rate.
 
         Parameters
         ----------
         count : int, optional
             Frequencies, evenly spaced in their logarithm.
+        gain : {"low", "middle", "high"}, optional
+            Gain of the stage.
 
         Returns
         -------
@@ -265,7 +271,9 @@ class LoopReport(Result):
         if count > 100_000:
             raise ParameterError("count", count, "100000 at most")
         frequency = np.geomspace(1e-3 * highest, highest, count)
-        curves = _core.loop_response(self.controller._core, self.plant, frequency.tolist())
+        one_of("gain", gain, GAINS)
+        plant = self.plants[GAINS.index(gain)]
+        curves = _core.loop_response(self.controller._core, plant, frequency.tolist())
         *pairs, learning = curves
         loop, sensitivity, complementary = (
             np.asarray(pair) @ np.array([1.0, 1.0j]) for pair in pairs
@@ -321,7 +329,7 @@ def check_loop(
     plants = linearised_plants(plant_of(stage), controller.limits, more)
     cases = [_check(controller, linear) for linear in plants]
     return LoopReport(
-        controller=controller, low=cases[0], middle=cases[1], high=cases[2], plant=plants[1]
+        controller=controller, low=cases[0], middle=cases[1], high=cases[2], plants=tuple(plants)
     )
 
 

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ... import _core
-from ..._support.arguments import not_negative
+from ..._support.arguments import not_negative, positive
 from ..._support.arrays import signal_of
 from ..._support.display.frames import frame_of
 from ..._support.display.result import Panel, Result
 from ..._support.files.writing import write_result
 from ..._support.statistics import FIGURES, ErrorStatistics
 from ..._support.units import drive_word, shown_unit
-from ...errors import ParameterError
+from ...errors import DataError, ParameterError
 from ...stages.inverse import PlayedVoltage
+from .settling import Settling, settled_moves
 
 if TYPE_CHECKING:
     import os
@@ -36,6 +37,8 @@ __all__ = ["Metrics", "Tracking"]
 
 # Periods after which what learns has learnt.
 LEARNT = 3
+# Samples of a spectrum, at least.
+FEWEST = 16
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -219,6 +222,74 @@ class Tracking(Result):
                 verb="are",
             )
         return part
+
+    def error_spectrum(self) -> tuple[Array, Array]:
+        """Return the amplitude density of the measured error, from `settled` on.
+
+        By Welch's method (1967, doi 10.1109/TAU.1967.1161901) with Hann windows of a quarter of the
+        run, half overlapped.
+
+        Returns
+        -------
+        frequency, density : ndarray, shape (k,)
+            Frequencies above 0 [Hz], and the root of the power density [m/sqrt(Hz)].
+
+        Raises
+        ------
+        DataError
+            There are fewer than 16 samples after `settled`, or a reading is missing.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010())
+        >>> run = pt.track(pt.VirtualStage.xu_li_2010(seed=1), loop, "sine:0.2Hz,0..100um,20s")
+        >>> frequency, density = run.error_spectrum()
+        >>> round(float(frequency[-1]))
+        25
+        """
+        from scipy.signal import welch
+
+        error = self.error[self.t >= self.settled]
+        if error.size < FEWEST or not np.isfinite(error).all():
+            raise DataError(
+                f"the run has {error.size} samples after {self.settled:g} s: expected {FEWEST} "
+                "readings or more without a gap"
+            )
+        frequency, power = welch(error, 1.0 / self.controller.dt, nperseg=max(8, error.size // 4))
+        return frequency[1:], np.sqrt(power[1:])
+
+    def settling(self, band: float = 0.02) -> list[Settling]:
+        """Return when each move from one level of the reference to the next has settled.
+
+        Parameters
+        ----------
+        band : float, optional
+            Distance from the level, as a share of the move, within which it has settled.
+
+        Returns
+        -------
+        list of Settling
+            One for each level that is held for four samples or more, of the true displacement;
+            empty where the reference holds none.
+
+        Raises
+        ------
+        ParameterError
+            `band` is not above 0.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> stage = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=[10.0], weights=[0.2e-6])
+        >>> loop = pt.Controller(dt=1e-3, limits=(0.0, 75.0), feedforward=stage.inverse())
+        >>> moves = pt.track(stage, loop, "staircase:levels=0/20um,dwell=100ms").settling()
+        >>> [round(1e3 * move.time) for move in moves]
+        [16]
+        """
+        return settled_moves(
+            self.t, self.desired, self.displacement, positive("band", band, "share of a move")
+        )
 
     @cached_property
     def periods(self) -> list[Metrics]:
