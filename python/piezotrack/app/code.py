@@ -20,7 +20,7 @@ def plain(value: float) -> str:
     return text.removesuffix(".0")
 
 
-def call(function: str, *arguments: str, **keywords: object) -> str:
+def call(function: str, /, *arguments: str, **keywords: object) -> str:
     """Write a call of Python; keywords that are None are left out.
 
     Parameters
@@ -54,7 +54,7 @@ class Code(str):
         return str(self)
 
 
-def command(name: str, *arguments: str, **options: object) -> str:
+def command(name: str, /, *arguments: str, **options: object) -> str:
     """Write a command for a shell; options that are None, False or empty are left out.
 
     Parameters

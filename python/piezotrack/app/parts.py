@@ -32,6 +32,7 @@ __all__ = [
     "check",
     "code",
     "controls",
+    "entry",
     "file",
     "lights",
     "message",
@@ -108,9 +109,7 @@ class Plotter:
             first, last = max(int(inside[0]) - 1, 0), min(int(inside[1]) + 1, t.size)
         return first + extremes(values[first:last], 2 * self.width)
 
-    def in_plane(
-        self, chart: str, x: Array, y: Array, name: str, role: str, **style: Any
-    ) -> Part:
+    def in_plane(self, chart: str, x: Array, y: Array, name: str, role: str, **style: Any) -> Part:
         """Draw a path in the plane, each way from pixel to pixel once; as `over_time`."""
         x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         if (box := self.zoom.get(chart)) is not None:
@@ -241,15 +240,15 @@ def table(key: str, title: str, columns: Sequence[str], rows: Sequence[Sequence[
 def cards(key: str, title: str, *items: Part, step: str) -> Part:
     """Make cards to choose from.
 
-    Each has ``title``, ``light``, ``value`` and ``text``; ``share`` and ``mark`` of its bar, and the
+    Each has ``title``, ``light``, ``value``, ``text``; ``share`` and ``mark`` of its bar, and the
     settings of the step that it chooses, ``choose``.
     """
     return {"kind": "cards", "id": key, "title": title, "items": list(items), "step": step}
 
 
-def code(key: str, title: str, lines: str) -> Part:
-    """Make lines of code to copy."""
-    return {"kind": "code", "id": key, "title": title, "text": lines}
+def code(key: str, title: str, lines: str, *, open: bool = False) -> Part:
+    """Make lines of code to copy, folded or open."""
+    return {"kind": "code", "id": key, "title": title, "text": lines, "open": open}
 
 
 def text(key: str, title: str, *sentences: str) -> Part:
@@ -257,9 +256,7 @@ def text(key: str, title: str, *sentences: str) -> Part:
     return {"kind": "text", "id": key, "title": title, "items": list(sentences)}
 
 
-def controls(
-    key: str, title: str, *items: Part, step: str = "log", folded: bool = False
-) -> Part:
+def controls(key: str, title: str, *items: Part, step: str = "log", folded: bool = False) -> Part:
     """Make a group of controls for the settings of a step, folded into a drawer or not."""
     return {
         "kind": "controls",
@@ -315,6 +312,11 @@ def select(
 def check(name: str, label: str, value: bool, **more: Any) -> Part:
     """Make a box to tick."""
     return {"type": "check", "name": name, "label": label, "value": value, **more}
+
+
+def entry(name: str, label: str, value: str, **more: Any) -> Part:
+    """Make a field for a text."""
+    return {"type": "entry", "name": name, "label": label, "value": value, **more}
 
 
 def file(name: str, label: str, **more: Any) -> Part:

@@ -60,7 +60,7 @@ class Windows:
         self.last_open = time.monotonic()
 
     def attach(self, window: str, socket: Socket, state: object) -> Session | None:
-        """Return the session of a window, a new one where there is none; None where all are used."""
+        """Return the session of a window, or a new one; None where all are used."""
         self.drop_old()
         if window in self.sessions:
             session, other, _ = self.sessions[window]
@@ -141,7 +141,7 @@ class _Nothing(_Checked):
 class _File(_Checked):
     """The files of the page: those of the package, by name, and no others."""
 
-    def initialize(self, windows: Windows, content: bytes, kind: str) -> None:
+    def initialize(self, windows: Windows, content: bytes = b"", kind: str = "") -> None:
         self.windows, self.content, self.kind = windows, content, kind
 
     def get(self) -> None:
@@ -191,8 +191,8 @@ class Socket(WebSocketHandler):
             if self.session is None or self.upcoming is None:
                 self.close(REFUSED, "bytes that were not announced")
                 return
-            given, self.upcoming = {**self.upcoming, "content": message}, None
-            self.session.take(given)
+            self.session.take({**self.upcoming, "content": message})
+            self.upcoming = None
             return
         if len(message) > LONGEST_MESSAGE:
             self.close(1009, f"a message of more than {LONGEST_MESSAGE} characters")
@@ -290,9 +290,7 @@ def serve(
     asyncio.run(_serve(ready, port, device, idle))
 
 
-async def _serve(
-    ready: Callable[[str], None], port: int, device: str | None, idle: float
-) -> None:
+async def _serve(ready: Callable[[str], None], port: int, device: str | None, idle: float) -> None:
     (socket,) = bind_sockets(port, "127.0.0.1")
     access = Access(socket.getsockname()[1])
     windows = Windows(access, device)

@@ -102,7 +102,7 @@ class Session:
         except PiezotrackError as problem:
             named = getattr(problem, "argument", None)
             error = {"text": str(problem), "control": named}
-        except Exception as problem:  # noqa: BLE001
+        except Exception as problem:
             error = {"text": _own_fault(problem), "control": None}
         answer = self._page()
         if download is not None:
@@ -132,7 +132,7 @@ class Session:
         elif do == "stop":
             desk.stop()
         elif do == "open":
-            return self._open(given)
+            self._open(given)
         else:
             step, _, name = str(do).partition(".")
             function = PAGES[step].actions.get(name) if step in PAGES else None
@@ -163,9 +163,7 @@ class Session:
         self.desk.state = state
 
     def _back(self, do: str) -> None:
-        source, target = (
-            (self._past, self._future) if do == "undo" else (self._future, self._past)
-        )
+        source, target = (self._past, self._future) if do == "undo" else (self._future, self._past)
         if source:
             target.append(self.desk.state)
             self.desk.state = source.pop()
@@ -210,7 +208,7 @@ class Session:
             parts = PAGES[step].page(desk)
         except PiezotrackError as problem:
             parts = [messages("fault", message("red", str(problem)))]
-        except Exception as problem:  # noqa: BLE001
+        except Exception as problem:
             parts = [messages("fault", message("red", _own_fault(problem)))]
         rail = []
         for name in STEPS:
@@ -237,7 +235,7 @@ def _light(desk: Desk, name: str) -> tuple[str, str]:
         return PAGES[name].light(desk)
     except PiezotrackError as problem:
         return "red", str(problem)
-    except Exception as problem:  # noqa: BLE001
+    except Exception as problem:
         return "red", _own_fault(problem)
 
 

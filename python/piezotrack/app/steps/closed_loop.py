@@ -6,7 +6,6 @@ import math
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...control.controller.controller import Controller
 from ...control.laws.pid import Pid
 from ...control.loop.stability import check_loop
 from ...control.parts.filters import LowPass, Notch
@@ -29,6 +28,7 @@ from .log import stamp
 from .model import fit_of, test_of
 
 if TYPE_CHECKING:
+    from ...control.controller.controller import Controller
     from ...control.loop.stability import LoopReport
     from ...control.loop.tracking import Tracking
     from ...control.tuning.tuned import Tuned
@@ -237,7 +237,13 @@ def _key(desk: Desk) -> list[Any]:
     """Return what a tuning depends on."""
     state = desk.state.loop
     kept = [state.speed, state.robustness, state.repetitive, state.delay, state.spread]
-    return [Same(model_of(desk)), kept, noise_of(desk), reference_text(desk), desk.state.motion.file]
+    return [
+        Same(model_of(desk)),
+        kept,
+        noise_of(desk),
+        reference_text(desk),
+        desk.state.motion.file,
+    ]
 
 
 def tuned_of(desk: Desk, *, full: bool) -> Tuned:
@@ -253,7 +259,7 @@ def tuned_of(desk: Desk, *, full: bool) -> Tuned:
 
 
 def known_tuning(desk: Desk) -> tuple[Tuned, bool] | None:
-    """Return the best tuning of the present settings that there is, and whether it is the full one."""
+    """Return the best tuning of the present settings so far, and whether it is the full one."""
     for name, full in (("tuned", True), ("quick", False)):
         found = desk.known(name, _key(desk))
         if found is not None:
@@ -318,7 +324,9 @@ def _from_margins(desk: Desk) -> Controller:
     settings = tuning_settings(desk) | {"parts": None, "goal": Goal()}
     stage = VirtualStage.of(model_of(desk), noise=noise_of(desk), seed=1)
     key = [Same(model_of(desk)), asdict(margins_of(desk)), desk.state.loop.delay]
-    found: Controller = desk.result("from margins", key, lambda: tune([stage], **settings).controller)
+    found: Controller = desk.result(
+        "from margins", key, lambda: tune([stage], **settings).controller
+    )
     return found
 
 

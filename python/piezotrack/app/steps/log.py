@@ -157,10 +157,10 @@ class LogStep:
             *page,
             _flags(state, found, log, part),
             _drive_chart(desk, found, log, part),
-            _displacement_chart(desk, log, part),
+            _displacement_chart(desk, part),
             _loop_chart(desk, part),
             _lights(found),
-            *_next(desk, part),
+            *_next(desk),
             parts.code("code", "The same in Python", "\n".join(self.python(desk))),
             parts.code("command", "and as a command", "\n".join(self.commands(desk))),
         ]
@@ -369,7 +369,7 @@ def _drive_chart(desk: Desk, found: LogInfo, log: Dataset, part: Dataset) -> Par
     )
 
 
-def _displacement_chart(desk: Desk, log: Dataset, part: Dataset) -> Part:
+def _displacement_chart(desk: Desk, part: Dataset) -> Part:
     """Draw the displacement of the window, with readings that are far off or missing."""
     unit, scale = best_length_unit(part.stroke)
     y = part.recorded
@@ -413,7 +413,7 @@ def _lights(found: LogInfo) -> Part:
     return parts.lights("determines", "What this record can determine", *items)
 
 
-def _next(desk: Desk, part: Dataset) -> list[Part]:
+def _next(desk: Desk) -> list[Part]:
     """Return the drive to record next, or the button that computes it."""
     drive = desk.suggested
     if drive is None or drive[0] != desk.state.log:
@@ -428,7 +428,7 @@ def _next(desk: Desk, part: Dataset) -> list[Part]:
         ]
     found: SuggestedDrive = drive[1]
     unit, scale = shown_unit(found.drive_unit)
-    t = found.dt * np.arange(found.u.size)
+    t = found.dt * np.arange(found.u.size, dtype=np.float64)
     line = desk.plotter.over_time("next", t, scale * found.u, "drive", "drive")
     blocks = ", ".join(dict.fromkeys(found.blocks))
     words = f"A drive of {t[-1]:.3g} s that determines a model better than a sine: {blocks}."

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._support.units import best_length_unit, decibels, length_text
-from ...control.tuning.goal import Goal
 from .. import parts
 from ..code import Code, call, command, plain
 from .closed_loop import (
@@ -26,7 +25,7 @@ from .closed_loop import (
     tuning_parts,
 )
 from .model import chosen_trial
-from .motion import motion_line, motion_word, settled_view
+from .motion import motion_line, motion_word
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -71,10 +70,7 @@ class LoopStep:
         """Return sliders, error, spectrum, Bode and Nyquist, and the margins."""
         if not desk.state.log.source or chosen_trial(desk) is None:
             return [parts.needs("model", "Fit a model first.")]
-        known = known_tuning(desk)
-        if known is None and not by_hand(desk) and "tuning" not in desk.jobs:
-            _tune(desk, {})
-        elif known is None and not by_hand(desk) and _outdated(desk):
+        if known_tuning(desk) is None and not by_hand(desk) and desk.tuned_for != _settings(desk):
             _tune(desk, {})
         controller = controller_of(desk)
         run, report = run_of(desk, controller), report_of(desk, controller)
@@ -166,7 +162,14 @@ def controller_lines(desk: Desk) -> list[str]:
         limits=Code("fit.drive_range"),
         feedforward=Code("fit.inverse()"),
         parts=known,
-        margins=Code(call("pt.Margins", gain=margins.gain, phase=margins.phase, sensitivity=margins.sensitivity)),
+        margins=Code(
+            call(
+                "pt.Margins",
+                gain=margins.gain,
+                phase=margins.phase,
+                sensitivity=margins.sensitivity,
+            )
+        ),
         spread=Code(f"pt.Spread(gain={plain(state.spread)})") if state.spread else None,
         goal=Code(f"pt.Goal(effort={effort_of(desk)!r})") if effort_of(desk) else None,
         timing=Code(f"pt.Timing(delay={plain(state.delay)})") if state.delay else None,
@@ -180,7 +183,7 @@ def _stable(desk: Desk, report: LoopReport) -> bool:
 
 
 def _case(desk: Desk, check: Any) -> tuple[bool, str]:
-    """Return whether a loop is stable at a gain and within the spread about it, and that in words."""
+    """Return whether a loop is stable at a gain and within the spread, and that in words."""
     spread = desk.state.loop.spread
     if not check.stable:
         return False, "unstable"
@@ -242,7 +245,11 @@ def _gains(desk: Desk, controller: Controller) -> Part:
     gains, rate = gains_of(controller), 1.0 / controller.dt
     base = gains_of(desk.last_tuned) if desk.last_tuned is not None else gains
     items = []
-    for name, label, unit in (("kp", "kp", "V/um"), ("ki", "ki", "V/(um s)"), ("kd", "kd", "V s/um")):
+    for name, label, unit in (
+        ("kp", "kp", "V/um"),
+        ("ki", "ki", "V/(um s)"),
+        ("kd", "kd", "V s/um"),
+    ):
         value, middle = getattr(gains, name), getattr(base, name)
         least = max(middle, 1e-9 * (gains.kp or 1.0)) / AROUND
         bounds = (min(least, value or least), max(middle * AROUND, value, 2.0 * least))
@@ -289,7 +296,9 @@ def _error_chart(desk: Desk, run: Tracking, before: Tracking | None) -> Part:
         kept = _last_period(before)
         error = (before.desired - before.displacement)[kept]
         lines.append(
-            plot.over_time("l-error", before.t[kept], scale * error, "accepted", "accepted", dash=True)
+            plot.over_time(
+                "l-error", before.t[kept], scale * error, "accepted", "accepted", dash=True
+            )
         )
     rms = [length_text(float(np.sqrt(np.nanmean(one[part] ** 2))), 3) for one in (measured, true)]
     words = f"Over one settled period: {rms[0]} rms measured, {rms[1]} rms true."
@@ -334,9 +343,7 @@ def _bode(desk: Desk, report: LoopReport, before: LoopReport | None) -> list[Par
         planes.append(parts.points(*_plane(curves.open_loop), shown, role, wide=name == "middle"))
     sensitivity = report.response(POINTS)
     sizes.append(
-        parts.points(
-            sensitivity.frequency, np.abs(sensitivity.sensitivity), "sensitivity", "error"
-        )
+        parts.points(sensitivity.frequency, np.abs(sensitivity.sensitivity), "sensitivity", "error")
     )
     if before is not None:
         old = before.response(POINTS)
@@ -347,7 +354,9 @@ def _bode(desk: Desk, report: LoopReport, before: LoopReport | None) -> list[Par
     middle = report.middle
     gain = "none" if middle.gain_margin is None else f"{decibels(middle.gain_margin):.3g} dB"
     phase = (
-        "none" if middle.phase_margin is None else f"{math.degrees(middle.phase_margin):.3g} degrees"
+        "none"
+        if middle.phase_margin is None
+        else f"{math.degrees(middle.phase_margin):.3g} degrees"
     )
     words = f"Gain margin {gain}, phase margin {phase}, Ms {middle.sensitivity:.3g}."
     return [
@@ -394,20 +403,11 @@ def _margins(desk: Desk, report: LoopReport) -> Part:
     return parts.table("margins", "Margins", (*columns, "bandwidth"), rows)
 
 
-def _outdated(desk: Desk) -> bool:
-    """Whether the last tuning was for other settings, and none runs for these."""
-    return desk.tuned_for != _settings(desk)
-
-
 def _settings(desk: Desk) -> object:
+    """Return all that a search depends on."""
     state = desk.state
-    return (state.log, state.model, state.motion, _without_hand(desk))
-
-
-def _without_hand(desk: Desk) -> object:
-    from dataclasses import replace
-
-    return replace(desk.state.loop, second=False, **BY_HAND)
+    loop = state.changed("loop", {**BY_HAND, "second": False}).loop
+    return (state.log, state.model, state.motion, loop)
 
 
 def _tune(desk: Desk, _: Mapping[str, Any]) -> None:

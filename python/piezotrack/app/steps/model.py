@@ -12,6 +12,7 @@ from ..._support.units import best_length_unit, length_text, shown_unit
 from ...data.reader import read
 from ...errors import DataError, Interrupted, PiezotrackError
 from ...identification.fit import identify
+from ...identification.fitted.validation import validated
 from ...identification.methods.descents import Descents
 from ...identification.methods.least_squares import LeastSquares
 from ...identification.views.quantities import errors_of, of_sensor, of_stage, predicted
@@ -104,7 +105,9 @@ def test_of(desk: Desk) -> Dataset:
         log = log.zeroed() if desk.state.log.zero else log
         return log if state.test_from <= log.t[0] else log[state.test_from :]
 
-    found: Dataset = desk.result("test", [stamp(path), state.test_from, desk.state.log.zero], compute)
+    found: Dataset = desk.result(
+        "test", [stamp(path), state.test_from, desk.state.log.zero], compute
+    )
     return found
 
 
@@ -193,7 +196,8 @@ class ModelStep:
         lines = []
         if same:
             # The window of the first step is narrowed.
-            lines.append(f"train = log[{plain(float(train.t[0]))}:{plain(_until(window_of(desk), state.share))}]")
+            until = plain(_until(window_of(desk), state.share))
+            lines.append(f"train = log[{plain(float(train.t[0]))}:{until}]")
             lines.append(f"test = log[{plain(float(test.t[0]))}:]")
         else:
             cut = ".zeroed()" if desk.state.log.zero else ""
@@ -205,7 +209,7 @@ class ModelStep:
 
     def commands(self, desk: Desk) -> list[str]:
         """Identify the chosen model."""
-        trial, state = chosen_trial(desk), desk.state.model
+        trial = chosen_trial(desk)
         if trial is None:
             return []
         return [command("identify", desk.state.log.source, **model_options(desk, trial.info.name))]
@@ -261,7 +265,9 @@ def _split(desk: Desk) -> Part:
     histories = [(None, "what the record shows"), ("virgin", "never moved"), ("settled", "settled")]
     drifts = [(None, "where the record shows one"), (True, "fitted"), (False, "none")]
     items += [
-        parts.select("history", "Before the record", state.history, [*histories, ("fit", "fitted")]),
+        parts.select(
+            "history", "Before the record", state.history, [*histories, ("fit", "fitted")]
+        ),
         parts.select("drift", "Drift of the sensor", state.drift, drifts),
         parts.check("delay", "Fit a delay", state.delay),
         parts.number("seed", "Seed", state.seed, whole=True),
@@ -295,7 +301,11 @@ def _cards(desk: Desk, trials: Trials) -> Part:
             card |= {"light": "red", "value": "\N{EN DASH}", "text": trial.error}
         elif trial.running:
             cost = f", {length_text(trial.course[-1][1], 3)}" if trial.course else ""
-            card |= {"light": "grey", "value": "fitting", "text": f"{len(trial.course)} iterations{cost}"}
+            card |= {
+                "light": "grey",
+                "value": "fitting",
+                "text": f"{len(trial.course)} iterations{cost}",
+            }
         else:
             running = "models" in desk.running
             card |= {"light": "grey", "value": "waits" if running else "stopped", "text": ""}
@@ -403,15 +413,15 @@ def _begin(desk: Desk, _: Mapping[str, Any]) -> None:
     """Fit all models that are not fitted yet, one after the other."""
     trials, (train, test, _) = trials_of(desk), parts_of(desk)
     trials.begun = True
-    arguments, state = given(_arguments(desk)), desk.state.model
-    method = (Descents(seed=state.seed), LeastSquares())
+    method = (Descents(seed=desk.state.model.seed), LeastSquares())
+    arguments = {**given(_arguments(desk)), "method": method}
 
     def work(job: Job) -> None:
         for trial in trials.rows.values():
             if job.stop.is_set():
                 break
             if trial.fit is None:
-                _fit(trial, train, test, {**arguments, "method": method}, job)
+                _fit(trial, train, test, arguments, job)
         best = next(iter(trials.done), None)
         if best is not None and best.fit is not None and not job.stop.is_set():
             best.band = best.fit.prediction_band(test)
@@ -434,7 +444,9 @@ def _fit(trial: Trial, train: Dataset, test: Dataset, arguments: dict[str, Any],
     job.changed()
     try:
         fit = identify(train, trial.info.name, progress=False, **arguments)
-        trial.score, trial.fit = fit.score(test), fit
+        fit, score = validated(fit, test)
+        # The fit last: what is there is shown.
+        trial.score, trial.fit = score, fit
     except Interrupted:
         pass
     except PiezotrackError as error:

@@ -214,7 +214,9 @@ def _motion_chart(desk: Desk, runs: Mapping[str, Tracking]) -> Part:
         plot.over_time("m-motion", one.t, scale * one.displacement, NAMES[name], ROLES[name])
         for name, one in runs.items()
     ]
-    desired = plot.over_time("m-motion", run.t, scale * run.desired, "desired", "desired", dash=True)
+    desired = plot.over_time(
+        "m-motion", run.t, scale * run.desired, "desired", "desired", dash=True
+    )
     far = reach.high - reach.low
     regions = [
         parts.region(a, b, "beyond the reach", "bad", axis="y", hatched=True)

@@ -41,7 +41,9 @@ def tune_command(
     largest_error: Annotated[float | None, Option("Largest rms error, as 20nm", LENGTH)] = None,
     effort: Annotated[
         float,
-        Option("Error that a change of the command of 1 V rms from sample to sample is worth", LENGTH),
+        Option(
+            "Error that a change of the command of 1 V rms from sample to sample is worth", LENGTH
+        ),
     ] = 0.0,
     gain_margin: Annotated[float, Option("Least gain margin", DECIBELS)] = 6.0,
     phase_margin: Annotated[float, Option("Least phase margin", DEGREES)] = 30.0,

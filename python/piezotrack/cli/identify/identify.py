@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -34,7 +33,6 @@ if TYPE_CHECKING:
 
     from ...data.dataset import Dataset
     from ...identification.fitted.identification import Identification
-    from ...identification.fitted.score import Score
     from ...identification.problem.records import Record
 
 __all__ = ["head_of", "identify_command"]
@@ -72,6 +70,7 @@ def identify_command(
 ) -> None:
     """Identify models of a stage from one log or several."""
     from ...identification.fitted.score import share_fitted
+    from ...identification.fitted.validation import validated
     from ...identification.views.report_page.page import write_report
 
     kinds = Kinds.checked(model)
@@ -122,7 +121,7 @@ def identify_command(
                 progress=output.progress,
                 checkpoint=checkpoint,
             )
-        fit, score = _judged(fit, second)
+        fit, score = (fit, None) if second is None else validated(fit, second)
         written += output.write(partial(_write, fit, second))
         if report is not None:
             written.append(write_report(fit, report, command=command_line()))
@@ -212,25 +211,6 @@ def _search(records: list[Record], out: Path, kind: str, **arguments: Any) -> Id
             raise
         path = stopped.partial.save(make_folder(out) / _unfinished(kind))
         raise KeyboardInterrupt(f"{stopped}; the best so far is in {path}") from None
-
-
-def _judged(fit: Identification, second: Dataset | None) -> tuple[Identification, Score | None]:
-    """Score a fit on a second log; the result goes into the file of the model."""
-    if second is None:
-        return fit, None
-    score = fit.score(second)
-    judged = {
-        "source": second.source,
-        "sha256": second.sha256,
-        "window_s": [float(second.t[0]), float(second.t[-1])],
-        "rms": {"value": score.rms, "unit": "m"},
-        "max_error": {"value": score.max_error, "unit": "m"},
-        "max_error_time": {"value": score.max_error_time, "unit": "s"},
-        "fitted_share": score.fitted_share,
-        "fit_percent": {"value": score.fit_percent, "unit": "%"},
-        "offset": {"value": score.offset, "unit": "m"},
-    }
-    return replace(fit, details={**fit.details, "validation": judged}), score
 
 
 def _write(fit: Identification, second: Dataset | None, place: Path) -> list[Path]:

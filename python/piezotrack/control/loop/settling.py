@@ -69,9 +69,7 @@ def settled_moves(t: Array, desired: Array, actual: Array, band: float) -> list[
     moves = []
     for (_, begin), (first, last) in pairwise(holds):
         low, high = float(desired[begin]), float(desired[first])
-        outside = np.flatnonzero(
-            np.abs(actual[begin : last + 1] - high) > band * abs(high - low)
-        )
+        outside = np.flatnonzero(np.abs(actual[begin : last + 1] - high) > band * abs(high - low))
         settled = begin + 1 + int(outside[-1]) if outside.size else begin
         time = math.inf if settled > last else float(t[settled] - t[begin])
         moves.append(Settling(float(t[begin]), low, high, time))

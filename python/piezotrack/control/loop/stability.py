@@ -249,9 +249,7 @@ class LoopReport(Result):
         law = {"by": "check_loop"} | ({"antiwindup": "held state"} if self.holds_state else {})
         return law | {name: case.margins() for name, case in self.cases}
 
-    def response(
-        self, count: int = 400, *, gain: Gain = "middle"
-    ) -> LoopResponse:
+    def response(self, count: int = 400, *, gain: Gain = "middle") -> LoopResponse:
         """Frequency response up to half the sampling rate.
 
         Parameters

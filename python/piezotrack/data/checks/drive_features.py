@@ -382,9 +382,7 @@ def _of_mode(time: TimeFeatures, drive: DriveFeatures) -> Determination:
     if drive.mode_limit == 0.0:
         words = "too slow for a mode: record steps or a chirp through it"
         return Determination("mode", "no", words)
-    words = (
-        f"a mode up to about {limit} would show above the noise; for a higher one record steps"
-    )
+    words = f"a mode up to about {limit} would show above the noise; for a higher one record steps"
     return Determination("mode", "partly", words)
 
 

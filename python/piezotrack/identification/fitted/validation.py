@@ -1,0 +1,45 @@
+"""The score of a fit on a record that it was not fitted to, kept with its model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ...data.dataset import Dataset
+    from .identification import Identification
+    from .score import Score
+
+__all__ = ["validated"]
+
+
+def validated(fit: Identification, data: Dataset) -> tuple[Identification, Score]:
+    """Score a fit on a second record; the result goes into the file of the model.
+
+    Parameters
+    ----------
+    fit : Identification
+        The fit.
+    data : Dataset
+        The second record.
+
+    Returns
+    -------
+    fit : Identification
+        The same, with the score in its details.
+    score : Score
+        The score.
+    """
+    score = fit.score(data)
+    validation = {
+        "source": data.source,
+        "sha256": data.sha256,
+        "window_s": [float(data.t[0]), float(data.t[-1])],
+        "rms": {"value": score.rms, "unit": "m"},
+        "max_error": {"value": score.max_error, "unit": "m"},
+        "max_error_time": {"value": score.max_error_time, "unit": "s"},
+        "fitted_share": score.fitted_share,
+        "fit_percent": {"value": score.fit_percent, "unit": "%"},
+        "offset": {"value": score.offset, "unit": "m"},
+    }
+    return replace(fit, details={**fit.details, "validation": validation}), score
