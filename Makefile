@@ -134,7 +134,7 @@ $(WHEELS)/built: $(VENV)/pip $(SOURCES)
 
 $(VENV)/installed: $(WHEELS)/built
 	$(BIN)/python -m pip install --quiet --force-reinstall --no-deps $(WHEELS)/*.whl
-	$(BIN)/python -m pip install --quiet $(WHEELS)/*.whl
+	$(BIN)/python -m pip install --quiet "$$(ls $(WHEELS)/*.whl)[app]"
 	@touch $@
 
 $(VENV)/tools: $(VENV)/pip pyproject.toml

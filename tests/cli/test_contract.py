@@ -30,6 +30,7 @@ TABLE = """
 --decimate        N|auto                                    Every Nth sample
 --decouple        -                                         decouple the feedforward
 --delay           TIME                                      Delay of the loop
+--browser         -                                         Open the browser
 --delay-spread    TIME                                      Largest delay in addition
 --device          ADDRESS                                   Device
 --displacement    COLUMN                                    Column of the displacement
@@ -50,6 +51,7 @@ TABLE = """
 --from-rest       -                                         whole motion from rest
 --gain            NUMBER                                    Learning gain
 --gain-margin     DECIBELS                                  Least gain margin
+--effort          LENGTH                                    change of the command
 --gain-spread     PERCENT                                   Range of the stage's gain
 --history         virgin|settled|fit|rest                   State at the beginning
 --hold            foh|zoh                                   Drive between samples

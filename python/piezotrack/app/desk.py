@@ -109,8 +109,6 @@ class Desk:
     ----------
     changed : callable
         Shows the page again, from any thread.
-    device : str, optional
-        Address of the device that was named on the command line.
 
     Attributes
     ----------
@@ -128,10 +126,9 @@ class Desk:
         Settings that the last search was for.
     """
 
-    def __init__(self, changed: Callable[[], None], device: str | None = None) -> None:
+    def __init__(self, changed: Callable[[], None]) -> None:
         self.state = State()
         self.plotter = Plotter(800, {})
-        self.device = device
         self.suggested: Any = None
         self.last_tuned: Controller | None = None
         self.accepted: Controller | None = None

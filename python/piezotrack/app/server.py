@@ -14,6 +14,7 @@ from .session import Session
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
 try:
     from tornado.httpserver import HTTPServer
@@ -49,13 +50,13 @@ class Windows:
     ----------
     access : Access
         Who may reach them.
-    device : str or None
-        Address of a device.
+    log : pathlib.Path or None
+        Log that a new window begins with.
     """
 
-    def __init__(self, access: Access, device: str | None) -> None:
+    def __init__(self, access: Access, log: Path | None) -> None:
         self.access = access
-        self.device = device
+        self.log = log
         self.sessions: dict[str, tuple[Session, Socket | None, float]] = {}
         self.last_open = time.monotonic()
 
@@ -73,7 +74,10 @@ class Windows:
                 self.end(idle[0])
             if len(self.sessions) >= MOST_SESSIONS:
                 return None
-            session = Session(socket.from_thread, self.device)
+            session = Session(socket.from_thread)
+            if self.log is not None:
+                content = {"name": self.log.name, "content": self.log.read_bytes()}
+                session.take({"do": "open", "purpose": "log", **content})
             if isinstance(state, str):
                 session.take({"do": "link", "text": state})
         self.sessions[window] = (session, socket, time.monotonic())
@@ -265,8 +269,8 @@ def application(windows: Windows) -> Application:
 def serve(
     ready: Callable[[str], None],
     *,
+    log: Path | None = None,
     port: int = 0,
-    device: str | None = None,
     idle: float = IDLE,
 ) -> None:
     """Serve the page to this computer until it is interrupted or no window has been open for long.
@@ -275,25 +279,32 @@ def serve(
     ----------
     ready : callable
         Called with the address, whose fragment has the token, when the server listens.
+    log : pathlib.Path, optional
+        Log that a new window begins with.
     port : int, optional
         TCP port; any free one where it is 0.
-    device : str, optional
-        Address of a device that the page may drive.
     idle : float, optional
         Seconds without a window after which it ends.
 
     Raises
     ------
     DataError
-        tornado is not installed.
+        The log cannot be read.
     """
-    asyncio.run(_serve(ready, port, device, idle))
+    if log is not None:
+        try:
+            size = log.stat().st_size
+        except OSError as error:
+            raise DataError(f"{log}: {error.strerror}: expected a log") from None
+        if size > LARGEST_FILE:
+            raise DataError(f"{log} has {size} bytes: expected {LARGEST_FILE} at most")
+    asyncio.run(_serve(ready, log, port, idle))
 
 
-async def _serve(ready: Callable[[str], None], port: int, device: str | None, idle: float) -> None:
+async def _serve(ready: Callable[[str], None], log: Path | None, port: int, idle: float) -> None:
     (socket,) = bind_sockets(port, "127.0.0.1")
     access = Access(socket.getsockname()[1])
-    windows = Windows(access, device)
+    windows = Windows(access, log)
     server = HTTPServer(application(windows), max_body_size=1024, max_header_size=16384)
     server.add_sockets([socket])
     try:

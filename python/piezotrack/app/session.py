@@ -40,13 +40,11 @@ class Session:
     ----------
     send : callable
         Sends a message, and a file with it, to the window; from any thread.
-    device : str, optional
-        Address of a device.
     """
 
-    def __init__(self, send: Send, device: str | None = None) -> None:
+    def __init__(self, send: Send) -> None:
         self.send = send
-        self.desk = Desk(self.refresh, device)
+        self.desk = Desk(self.refresh)
         self._past: list[State] = []
         self._future: list[State] = []
         self._last_live: object = None

@@ -342,7 +342,13 @@ def with_hand(desk: Desk, base: Controller) -> Controller:
     kept = next((one for one in base.filters if isinstance(one, Notch)), None)
     if notch > 0.0:
         filters.append(Notch(notch) if kept is None else replace(kept, frequency=notch))  # type: ignore[arg-type]
-    pid = Pid(kp=kp, ti=kp / ki if ki > 0.0 else math.inf, td=kd / kp if kp > 0.0 else 0.0)
+    law = None if base.feedback is None else base.feedback._pid
+    pid = Pid(
+        kp=kp,
+        ti=kp / ki if ki > 0.0 else math.inf,
+        td=kd / kp if kp > 0.0 else 0.0,
+        tt=None if law is None else law.tt,
+    )
     repetitive = base.repetitive
     if state.repetitive and repetitive is None and (period := reference_of(desk).period):
         repetitive = Repetitive(period=period)

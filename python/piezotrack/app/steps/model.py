@@ -411,10 +411,10 @@ def _of_model(desk: Desk, trial: Trial) -> list[Part]:
 
 def _begin(desk: Desk, _: Mapping[str, Any]) -> None:
     """Fit all models that are not fitted yet, one after the other."""
-    trials, (train, test, _) = trials_of(desk), parts_of(desk)
+    trials, (train, test) = trials_of(desk), parts_of(desk)[:2]
     trials.begun = True
     method = (Descents(seed=desk.state.model.seed), LeastSquares())
-    arguments = {**given(_arguments(desk)), "method": method}
+    arguments: dict[str, Any] = {**given(_arguments(desk)), "method": method}
 
     def work(job: Job) -> None:
         for trial in trials.rows.values():

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
-from ..command import Option, command
-from ..options import OnDevice
+from ..command import Argument, Option, command
 
 __all__ = ["app_command"]
 
 
 @command()
 def app_command(
-    device: OnDevice = None,
+    log: Annotated[Path | None, Argument("Log that the page begins with", "FILE")] = None,
     port: Annotated[int, Option("TCP port, 0 for any free one")] = 0,
-    browser: Annotated[bool, Option("Print the address only", names=("--no-browser",))] = False,
+    browser: Annotated[bool, Option("Open the browser; default yes")] = True,
 ) -> None:
     """Open the page: from a log to a controller in the browser.
 
@@ -27,7 +27,7 @@ def app_command(
 
     def ready(address: str) -> None:
         print(f"the page is at {address}", flush=True)
-        if not browser:
+        if browser:
             webbrowser.open(address)
 
-    serve(ready, port=port, device=device)
+    serve(ready, log=log, port=port)

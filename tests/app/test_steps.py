@@ -1,0 +1,224 @@
+"""The steps of the page: what they compute is what commands and scripts compute."""
+
+from __future__ import annotations
+
+import io
+import shlex
+import time
+import zipfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from commands import ran
+from piezotrack.app.session import Session
+from piezotrack.app.steps import PAGES, model
+from piezotrack.app.steps.closed_loop import controller_of, range_of, reach_of, run_of
+from piezotrack.app.steps.motion import controllers
+from piezotrack.stages.registry import MODELS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from piezotrack.app.desk import Desk
+
+
+class Window:
+    """A session without a browser."""
+
+    def __init__(self) -> None:
+        self.answers: list[tuple[dict[str, Any], bytes | None]] = []
+        self.session = Session(lambda answer, content: self.answers.append((answer, content)))
+        self.desk: Desk = self.session.desk
+        self.parts: dict[str, dict[str, Any]] = {}
+
+    def do(self, do: str, **given: Any) -> tuple[dict[str, Any], bytes | None]:
+        """Send a message and wait for its answer."""
+        number, seen = 1 + len(self.answers), len(self.answers)
+        self.session.take({"do": do, "seq": f"{number}", **given})
+        until = time.monotonic() + 120.0
+        while time.monotonic() < until:
+            for answer, content in self.answers[seen:]:
+                if answer["seq"] == f"{number}":
+                    self.parts |= answer["changed"]
+                    return answer, content
+            time.sleep(0.005)
+        raise AssertionError(f"no answer to {do}")
+
+    def set(self, step: str, **values: Any) -> dict[str, Any]:
+        return self.do("set", step=step, values=values)[0]
+
+    def finish(self) -> None:
+        """Wait for what is computed in the background."""
+        until = time.monotonic() + 120.0
+        while self.desk.running:
+            assert time.monotonic() < until
+            time.sleep(0.02)
+        self.do("whole")
+
+    def take(self, name: str) -> tuple[str, bytes]:
+        answer, content = self.do(name)
+        assert answer["error"] is None, answer["error"]
+        assert content is not None
+        return answer["download"], content
+
+
+@pytest.fixture
+def window(monkeypatch: pytest.MonkeyPatch) -> Iterator[Window]:
+    kinds = tuple(one for one in MODELS if one.name in ("dahl", "duhem"))
+    monkeypatch.setattr(model, "MODELS", kinds)
+    made = Window()
+    yield made
+    made.session.close()
+
+
+def opened(window: Window, log: pt.Dataset, folder: Path, name: str = "stage.csv") -> None:
+    content = log.save(folder / name).read_bytes()
+    window.do("open", purpose="log", name=name, content=content)
+
+
+def test_the_files_are_those_of_the_commands(
+    window: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window.do("log.example")
+    window.do("go", to="model")
+    window.finish()
+    window.set("model", chosen="dahl")
+    window.do("go", to="loop")
+    window.finish()
+    window.do("go", to="use")
+    files = dict(window.take(f"use.{one}") for one in ("model", "controller", "export", "table"))
+
+    monkeypatch.chdir(tmp_path)
+    pt.datasets.dbo_training().save("training.csv")
+    pt.datasets.dbo_tracking().save("tracking.csv")
+    for line in PAGES["use"].commands(window.desk) + PAGES["motion"].commands(window.desk):
+        ran(*shlex.split(line)[1:])
+    assert Path("results/dahl.json").read_bytes() == files["dahl.json"]
+    assert Path("tuned/controller.json").read_bytes() == files["controller.json"]
+    assert Path("voltage/feedforward.csv").read_bytes() == files["feedforward.csv"]
+    with zipfile.ZipFile(io.BytesIO(files["controller.zip"])) as archive:
+        assert len(archive.namelist()) == 4
+        for name in archive.namelist():
+            assert Path("firmware", name).read_bytes() == archive.read(name)
+
+
+def test_the_script_makes_the_same_controller(
+    window: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window.do("log.example")
+    window.set("model", test="", test_from=0.0)
+    window.do("go", to="model")
+    window.finish()
+    window.set("model", chosen="dahl")
+    window.do("go", to="loop")
+    window.finish()
+    window.set("loop", kp=2e4)
+    files = dict(window.take(f"use.{one}") for one in ("controller", "script"))
+    monkeypatch.chdir(tmp_path)
+    pt.datasets.dbo_training().save("training.csv")
+    script = Path("steps.py")
+    script.write_bytes(files["piezotrack_steps.py"])
+    exec(compile(script.read_text(), "steps.py", "exec"), {})
+    made, kept = pt.load_controller("controller.json"), tmp_path / "page.json"
+    kept.write_bytes(files["controller.json"])
+    assert made.feedback == pt.load_controller(kept).feedback
+    assert isinstance(made.feedback, pt.Pid)
+    assert made.feedback.kp == 2e4
+
+
+def test_the_tuned_loop_follows_better_than_the_inverse_and_that_than_none(window: Window) -> None:
+    window.do("log.example")
+    window.do("go", to="model")
+    window.finish()
+    window.do("go", to="motion")
+    runs = {name: run_of(window.desk, one) for name, one in controllers(window.desk).items()}
+    rms = {name: run.score(true=True).rms_error for name, run in runs.items()}
+    assert rms["loop"] < rms["inverse"] < 0.2 * rms["without"]
+    low, high = range_of(window.desk)
+    reach = reach_of(window.desk)
+    assert reach.low < low < high < reach.high
+
+
+def test_faster_is_more_bandwidth_and_robust_is_less_sensitivity(window: Window) -> None:
+    window.do("log.example")
+    window.do("go", to="model")
+    window.finish()
+    found = {}
+    for speed, robustness in ((0.1, 0.5), (0.9, 0.5), (0.9, 1.0)):
+        window.set("loop", speed=speed, robustness=robustness)
+        window.do("go", to="loop")
+        window.finish()
+        report = pt.check_loop(
+            pt.VirtualStage.of(model.fit_of(window.desk)), controller_of(window.desk)
+        )
+        found[speed, robustness] = report
+    slow, fast, robust = found.values()
+    assert (slow.middle.bandwidth or 0.0) < 0.7 * (fast.middle.bandwidth or 0.0)
+    assert max(one.sensitivity for _, one in robust.cases) < 1.16
+    assert max(one.sensitivity for _, one in fast.cases) > 1.16
+
+
+def test_what_a_record_determines_is_a_light(window: Window, tmp_path: Path) -> None:
+    t = np.arange(4000) / 200.0
+    grows = (10.0 + 2.0 * t) * (1.0 - np.cos(2.0 * np.pi * t))
+    opened(window, pt.Dataset(u=grows, y=1e-6 * grows, t=t), tmp_path)
+    window.do("whole")
+    lights = {one["name"]: one["light"] for one in window.parts["log.determines"]["items"]}
+    assert lights["Loop"] == "green"
+    assert lights["Rate or lag"] == "red"
+    assert lights["Creep"] == "red"
+    assert lights["Small loops"] in ("green", "amber")
+
+
+def test_a_column_without_a_unit_is_red_and_a_button_mends_it(
+    window: Window,
+) -> None:
+    t = np.arange(2000) / 200.0
+    u = 30.0 - 30.0 * np.cos(2.0 * np.pi * t)
+    rows = "\n".join(f"{a:.6g},{b:.6g},{c:.9g}" for a, b, c in zip(t, u, u * 1.0, strict=True))
+    window.do("open", purpose="log", name="bare.csv", content=f"time_s,u,y_um\n{rows}\n".encode())
+    window.do("whole")
+    rail = window.answers[-1][0]["rail"][0]
+    assert rail["light"] == "red"
+    window.set("log", drive="u", **{"units.u": "V"})
+    window.do("whole")
+    assert window.answers[-1][0]["rail"][0]["light"] == "green"
+    assert "units={'u': 'V'}" in window.parts["log.code"]["text"]
+
+
+def test_noise_is_no_log(window: Window) -> None:
+    draws = np.random.default_rng(1)
+    window.do("open", purpose="log", name="noise.csv", content=draws.bytes(5000))
+    answer, _ = window.do("whole")
+    assert answer["rail"][0]["light"] == "red"
+    (fault,) = window.parts["log.fault"]["items"]
+    assert fault["level"] == "red"
+    assert fault["text"]
+
+
+def test_stop_ends_the_fits_and_keeps_what_is_done(window: Window) -> None:
+    window.do("log.example")
+    window.do("go", to="model")
+    window.do("stop")
+    until = time.monotonic() + 20.0
+    while not window.desk.jobs["models"].done:
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    assert len(model.trials_of(window.desk).done) < 2
+
+
+def test_a_state_is_the_same_page_again(window: Window) -> None:
+    window.do("log.example")
+    window.set("log", window=[4.0, 12.5])
+    name, content = window.take("use.state")
+    assert name.endswith(".piezotrack.json")
+    before = window.desk.state
+    window.set("log", window=None)
+    window.do("open", purpose="state", name=name, content=content)
+    assert window.desk.state == before
+    window.do("undo")
+    assert window.desk.state.log.window is None
