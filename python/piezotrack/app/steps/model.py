@@ -11,8 +11,8 @@ import numpy as np
 from ..._support.units import best_length_unit, length_text, shown_unit
 from ...data.reader import read
 from ...errors import DataError, Interrupted, PiezotrackError
+from ...identification.comparison.validation import validated
 from ...identification.fit import identify
-from ...identification.fitted.validation import validated
 from ...identification.methods.descents import Descents
 from ...identification.methods.least_squares import LeastSquares
 from ...identification.views.quantities import errors_of, of_sensor, of_stage, predicted

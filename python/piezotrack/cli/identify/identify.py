@@ -69,8 +69,8 @@ def identify_command(
     output: Output,
 ) -> None:
     """Identify models of a stage from one log or several."""
+    from ...identification.comparison.validation import validated
     from ...identification.fitted.score import share_fitted
-    from ...identification.fitted.validation import validated
     from ...identification.views.report_page.page import write_report
 
     kinds = Kinds.checked(model)

@@ -85,8 +85,7 @@ def _measured(output: Output, seed: int) -> None:
         "",
         "The same by hand, and more:",
         *(f"  piezotrack {line}" for line in _commands(output.folder, fit.model.info.name)),
-        "In the browser (pip install piezotrack[app]):",
-        f"  piezotrack app {output.folder / 'log.csv'}",
+        f"In the browser: piezotrack app {output.folder / 'log.csv'}",
     ]
     document = {
         "model": {**fit.document(), "notes": fit.notes},

@@ -285,7 +285,7 @@ class Tracking(Result):
         >>> loop = pt.Controller(dt=1e-3, limits=(0.0, 75.0), feedforward=stage.inverse())
         >>> moves = pt.track(stage, loop, "staircase:levels=0/20um,dwell=100ms").settling()
         >>> [round(1e3 * move.time) for move in moves]
-        [16]
+        [19]
         """
         return settled_moves(
             self.t, self.desired, self.displacement, positive("band", band, "share of a move")

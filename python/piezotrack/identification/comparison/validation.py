@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ...data.dataset import Dataset
-    from .identification import Identification
-    from .score import Score
+    from ..fitted.identification import Identification
+    from ..fitted.score import Score
 
 __all__ = ["validated"]
 
