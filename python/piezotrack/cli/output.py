@@ -210,7 +210,7 @@ def print_words(words: str) -> None:
 
     Where the output is no terminal, and ``COLUMNS`` is not set, each line stays whole.
     """
-    print(wrapped(as_options(words), _columns()))
+    print(wrapped(as_options(words), _columns()), flush=True)
 
 
 def wrapped(words: str, columns: int | None) -> str:

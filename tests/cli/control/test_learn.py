@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -69,8 +70,8 @@ def test_the_table_that_is_written_follows_the_reference_on_the_stage() -> None:
 def test_the_convergence_is_said_before_the_first_table_and_the_errors_of_each_trial() -> None:
     lines = ran(*LEARN, *REAL, "--trials", "6").splitlines()
     assert "settled period, cutoff 250 Hz" in lines[0]
-    assert lines[1].startswith("the distance to the final table falls to 0.")
-    assert lines[1].endswith("; 18 models")
+    convergence = r"slowest convergence: factor 0\.\d{3} a trial, at [\d.]+ Hz on .+; 18 models"
+    assert re.fullmatch(convergence, lines[1])
     assert lines[2].split() == ["trial", "rms", "nm", "max", "nm", "noise", "nm"]
     trials = [line.split() for line in lines[3:9]]
     assert [one[0] for one in trials] == list("012345")
@@ -79,6 +80,15 @@ def test_the_convergence_is_said_before_the_first_table_and_the_errors_of_each_t
     assert lines[9] == "ended: all trials were made"
     assert lines[10] == f"best: trial 5, {errors[5]:.4g} nm rms after {errors[0]:.4g} nm"
     assert lines[-1] == "written: learnt.csv"
+
+
+def test_the_heading_is_wrapped_at_the_width_of_the_terminal(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    printed = ran(*LEARN, *REAL, "--trials", "1")
+    assert "slowest convergence" in printed
+    assert max(map(len, printed.splitlines())) <= 80
 
 
 def test_the_json_document_has_the_convergence_and_all_trials() -> None:

@@ -12,7 +12,7 @@ from ..command import Option, command, refuse_without_effect
 from ..connection import connected, with_what_is_kept
 from ..option_groups import Motion
 from ..options import ModelFile, OnDevice, Reference, Rest, Zero, number
-from ..output import Output
+from ..output import Output, print_words
 from ..values import FREQUENCY
 from .loop_options import (
     PAPER,
@@ -159,8 +159,7 @@ def _show(learner: IterativeLearning) -> None:
     from ...control.views.learning_text import heading, trial_line
 
     made = len(learner.trials)
-    line = trial_line(made - 1, learner.trials[-1]) if made else heading(learner)
-    print(line, flush=True)
+    print_words(trial_line(made - 1, learner.trials[-1]) if made else heading(learner))
 
 
 def _outcome(learning: Learning) -> str:

@@ -69,10 +69,10 @@ class Convergence:
         return self.factor < 1.0
 
     def __str__(self) -> str:
-        verb = "falls" if self.monotone else "GROWS"
+        words = "slowest convergence" if self.monotone else "DIVERGENCE"
         return (
-            f"the distance to the final table {verb} to {self.factor:.3g} times in a trial at "
-            f"worst, at {self.frequency:.3g} Hz on {self.model}; {len(self.cases)} models"
+            f"{words}: factor {self.factor:#.3g} a trial, at {self.frequency:.3g} Hz on "
+            f"{self.model}; {len(self.cases)} models"
         )
 
     @classmethod
