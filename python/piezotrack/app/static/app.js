@@ -103,7 +103,8 @@ function receive(answer) {
     performance.measure("answer", { start: begun.get(answer.seq), end: performance.now() });
     begun.delete(answer.seq);
   }
-  if (answer.seq === busy) {
+  // The server answers the latest of several: those before it have no answer.
+  if (busy !== null && answer.seq >= busy) {
     busy = null;
     if (waiting) {
       const next = waiting;

@@ -1,0 +1,322 @@
+"""Who may reach the page: each rule with the request that breaks it."""
+
+from __future__ import annotations
+
+import base64
+import http.client
+import json
+import os
+import re
+import socket
+import stat
+import struct
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from piezotrack.app import server
+from piezotrack.app.desk import Desk
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+WINDOW = "w" * 32
+
+
+class Served:
+    """A server in a thread, and requests to it."""
+
+    def __init__(self, idle: float = 60.0) -> None:
+        self.address = ""
+        ready = threading.Event()
+
+        def told(address: str) -> None:
+            self.address = address
+            ready.set()
+
+        self.thread = threading.Thread(
+            target=lambda: server.serve(told, idle=idle), daemon=True, name="server"
+        )
+        self.thread.start()
+        assert ready.wait(20.0)
+        found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/#token=(\S+)", self.address)
+        assert found is not None
+        self.port, self.token = int(found[1]), found[2]
+        self.host = f"127.0.0.1:{self.port}"
+
+    def request(
+        self, path: str = "/", method: str = "GET", **headers: str
+    ) -> http.client.HTTPResponse:
+        """Send a request with exactly these headers, and the right Host where none is given."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=10.0)
+        connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
+        for name, value in {"Host": self.host, **headers}.items():
+            if value:
+                connection.putheader(name, value)
+        connection.endheaders()
+        answer = connection.getresponse()
+        answer.read()
+        connection.close()
+        return answer
+
+    def upgrade(self, **headers: str) -> Socket | int:
+        """Ask for a socket: the socket, or the status of the refusal."""
+        given = {"Host": self.host, "Origin": f"http://{self.host}", **headers}
+        lines = [f"{name}: {value}" for name, value in given.items() if value]
+        key = base64.b64encode(os.urandom(16)).decode()
+        lines += ["Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13"]
+        text = "\r\n".join(["GET /socket HTTP/1.1", *lines, f"Sec-WebSocket-Key: {key}", "", ""])
+        raw = socket.create_connection(("127.0.0.1", self.port), timeout=20.0)
+        raw.sendall(text.encode())
+        reading = raw.makefile("rb")
+        status = int(reading.readline().split()[1])
+        while reading.readline().strip():
+            pass
+        if status != 101:
+            reading.close()
+            raw.close()
+            return status
+        return Socket(raw, reading)
+
+    def enter(self, window: str = WINDOW, token: Any = None) -> Socket:
+        made = self.upgrade()
+        assert isinstance(made, Socket)
+        given = {"token": self.token if token is None else token, "window": window, "width": 800}
+        made.send(json.dumps(given))
+        return made
+
+
+class Socket:
+    """A client of a websocket, by hand (RFC 6455), so that it can send what is wrong."""
+
+    def __init__(self, raw: socket.socket, reading: Any) -> None:
+        self.raw, self.reading = raw, reading
+
+    def send(self, message: str | bytes) -> None:
+        data = message.encode("utf-8", "surrogatepass") if isinstance(message, str) else message
+        size = len(data)
+        head = bytes([0x81 if isinstance(message, str) else 0x82])
+        if size < 126:
+            head += bytes([0x80 | size])
+        elif size < 65536:
+            head += bytes([0x80 | 126]) + struct.pack(">H", size)
+        else:
+            head += bytes([0x80 | 127]) + struct.pack(">Q", size)
+        # A mask of zeros leaves the data as they are.
+        self.raw.sendall(head + bytes(4) + data)
+
+    def receive(self) -> tuple[int, bytes]:
+        """Return the code of a frame and its content."""
+        first, second = self.reading.read(2)
+        size = second & 0x7F
+        if size == 126:
+            (size,) = struct.unpack(">H", self.reading.read(2))
+        elif size == 127:
+            (size,) = struct.unpack(">Q", self.reading.read(8))
+        return first & 0x0F, self.reading.read(size)
+
+    def answer(self) -> dict[str, Any]:
+        """Return the next message."""
+        while True:
+            code, data = self.receive()
+            if code == 1:
+                found: dict[str, Any] = json.loads(data)
+                return found
+            assert code == 9, data
+
+    def closed(self) -> int:
+        """Return the code with which the server closes."""
+        while True:
+            code, data = self.receive()
+            if code == 8:
+                self.end()
+                return int(struct.unpack(">H", data[:2])[0])
+
+    def end(self) -> None:
+        self.reading.close()
+        self.raw.close()
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    made = Served()
+    yield made
+    assert made.thread.is_alive()
+
+
+@pytest.mark.parametrize("path", ["/", "/app.js", "/nothing"])
+@pytest.mark.parametrize(
+    "host",
+    ["", "evil.example", "127.0.0.1", "127.0.0.1.evil.example:{}", "127.0.0.1:1", "[::1]:{}"],
+)
+def test_another_host_gets_nothing(served: Served, path: str, host: str) -> None:
+    named = host.format(served.port)
+    assert served.request(path, Host=named).status in (400, 403)
+    if path == "/":
+        assert served.upgrade(Host=named) in (400, 403)
+
+
+@pytest.mark.parametrize(
+    "origin",
+    ["", "null", "http://evil.example", "https://{}", "http://localhost:{port}", "http://{}.evil"],
+)
+def test_another_origin_gets_no_socket(served: Served, origin: str) -> None:
+    # localhost is a name of this server too, but not the one of the Host: a rebound pair.
+    assert served.upgrade(Origin=origin.format(served.host, port=served.port)) == 403
+
+
+def test_localhost_with_its_own_origin_is_this_computer(served: Served) -> None:
+    name = f"localhost:{served.port}"
+    made = served.upgrade(Host=name, Origin=f"http://{name}")
+    assert isinstance(made, Socket)
+    made.end()
+
+
+@pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "OPTIONS", "PATCH"])
+@pytest.mark.parametrize("path", ["/", "/app.js", "/socket", "/x"])
+def test_there_is_nothing_to_post(served: Served, method: str, path: str) -> None:
+    origin = f"http://{served.host}"
+    assert served.request(path, method, Origin=origin).status in (403, 405)
+    assert served.request(path, method).status in (403, 405)
+
+
+@pytest.mark.parametrize("path", ["/../state.py", "/%2e%2e/state.py", "/static/app.js", "/app.py"])
+def test_only_the_files_of_the_page_are_there(served: Served, path: str) -> None:
+    assert served.request(path).status == 404
+    assert served.request("/app.js").status == 200
+
+
+@pytest.mark.parametrize("path", ["/", "/app.js", "/app.css", "/nothing"])
+def test_every_answer_forbids_what_is_not_of_the_page(served: Served, path: str) -> None:
+    answer = served.request(path)
+    policy = answer.headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert "unsafe" not in policy
+    assert answer.headers["X-Content-Type-Options"] == "nosniff"
+    assert answer.headers["Referrer-Policy"] == "no-referrer"
+    assert answer.headers["Server"] is None
+
+
+@pytest.mark.parametrize("token", ["", "x", 7, None, ["a"], "\u00e9" * 43, "\ud800"], ids=repr)
+def test_without_the_token_a_socket_is_closed(served: Served, token: Any) -> None:
+    made = served.upgrade()
+    assert isinstance(made, Socket)
+    made.send(json.dumps({"token": token, "window": WINDOW}))
+    assert made.closed() == 4003
+    assert served.request().status == 200
+
+
+def test_a_message_before_the_token_is_not_done(served: Served) -> None:
+    made = served.upgrade()
+    assert isinstance(made, Socket)
+    made.send(json.dumps({"do": "log.example"}))
+    assert made.closed() == 4003
+
+
+def test_silence_is_closed(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "PATIENCE", 0.1)
+    made = served.upgrade()
+    assert isinstance(made, Socket)
+    assert made.closed() == 4003
+
+
+@pytest.mark.parametrize("text", ["[]", "7", "{", "[" * 50_000, '"x"'])
+def test_what_is_no_message_closes_the_socket(served: Served, text: str) -> None:
+    made = served.enter()
+    made.answer()
+    made.send(text)
+    assert made.closed() == 1003
+
+
+def test_sizes_are_limited(served: Served) -> None:
+    made = served.enter()
+    made.answer()
+    made.send(json.dumps({"do": "x" * 100_001}))
+    assert made.closed() == 1009
+
+
+def test_bytes_that_were_not_announced_are_refused(served: Served) -> None:
+    made = served.enter()
+    made.answer()
+    made.send(b"time_s,u_V,y_um\n0,0,0\n")
+    assert made.closed() == 4003
+
+
+def test_an_action_that_does_not_exist_is_one_sentence(served: Served) -> None:
+    made = served.enter()
+    made.answer()
+    for given in ({"do": "log.__class__"}, {"do": None}, {"do": "os.system"}, {"do": ["x"]}):
+        made.send(json.dumps({**given, "seq": 5}))
+        assert "action of the page" in made.answer()["error"]["text"]
+    made.send(json.dumps({"do": "set", "step": "log", "values": {"dt": True}, "seq": 6}))
+    assert made.answer()["error"]["control"] == "dt"
+    made.end()
+
+
+def test_the_same_window_has_one_socket_and_a_ninth_none(served: Served) -> None:
+    first = served.enter("a" * 32)
+    first.answer()
+    again = served.enter("a" * 32)
+    again.answer()
+    assert first.closed() == 4010
+    others = [again]
+    for i in range(server.MOST_SESSIONS - 1):
+        others.append(served.enter(f"{i:032}"))
+        others[-1].answer()
+    assert served.enter("b" * 32).closed() == 4008
+    for one in others:
+        one.end()
+
+
+def test_the_token_has_256_bits_and_is_in_no_answer(served: Served) -> None:
+    assert len(base64.urlsafe_b64decode(served.token + "=")) == 32
+    made = served.enter("c" * 32)
+    assert served.token not in json.dumps(made.answer())
+    made.end()
+
+
+def test_other_addresses_of_this_computer_are_not_listened_to(served: Served) -> None:
+    for family, address in ((socket.AF_INET, "127.0.0.2"), (socket.AF_INET6, "::1")):
+        with socket.socket(family) as one:
+            one.settimeout(2.0)
+            with pytest.raises(OSError):  # noqa: PT011
+                one.connect((address, served.port))
+
+
+def test_it_ends_when_no_window_is_open() -> None:
+    short = Served(idle=0.3)
+    short.thread.join(timeout=10.0)
+    assert not short.thread.is_alive()
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../../x.csv", "/etc/passwd", "a\0b.csv", "x" * 10_000, "", "..", "C:\\x\\y.csv", "a/b"],
+)
+def test_a_file_keeps_to_its_folder(name: str) -> None:
+    desk = Desk(lambda: None)
+    kept = desk.keep("log", name, b"content")
+    path = desk.file("log", kept)
+    folder = path.parent.parent
+    assert path.parent.name == "log"
+    assert path.read_bytes() == b"content"
+    if os.name == "posix":
+        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    desk.close()
+    assert not folder.exists()
+
+
+def test_a_large_file_ends_the_socket_not_the_server(served: Served) -> None:
+    # The limit itself is tested by the length that a frame announces.
+    made = served.enter("d" * 32)
+    made.answer()
+    made.send(json.dumps({"do": "open", "purpose": "log", "name": "x.csv"}))
+    head = bytes([0x82, 0x80 | 127]) + struct.pack(">Q", server.LARGEST_FILE + 1) + bytes(4)
+    made.raw.sendall(head)
+    begun = time.monotonic()
+    assert made.closed() == 1009
+    assert time.monotonic() - begun < 5.0
+    assert served.request().status == 200
