@@ -270,6 +270,21 @@ def _key(name: str, settings: Any) -> tuple[str, list[object]]:
         if isinstance(value, Same):
             kept.append(value.value)
             return id(value.value)
-        return asdict(value)
+        return _text_of(value)
 
     return name + json.dumps(settings, default=entry, sort_keys=True), kept
+
+
+# Texts of the last states, by identity: states do not change, and are asked for all the time.
+_texts: OrderedDict[int, tuple[object, str]] = OrderedDict()
+_texts_lock = threading.Lock()
+
+
+def _text_of(state: Any) -> str:
+    """Write a part of a state as a text that is the same for the same settings."""
+    with _texts_lock:
+        if id(state) not in _texts:
+            _texts[id(state)] = state, json.dumps(asdict(state), sort_keys=True)
+            while len(_texts) > KEPT:
+                _texts.popitem(last=False)
+        return _texts[id(state)][1]

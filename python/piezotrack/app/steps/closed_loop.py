@@ -159,13 +159,13 @@ def _micro(value: float) -> float:
 
 def reference_text(desk: Desk) -> str:
     """Return the motion as a text for `piezotrack.parse_reference`; empty for one of a file."""
-    state = desk.state.motion
-    low, high = (f"{1e6 * one:.5g}" for one in range_of(desk))
+    state, (bottom, top) = desk.state.motion, range_of(desk)
+    low, high = f"{1e6 * bottom:.5g}", f"{1e6 * top:.5g}"
     rate = f"{state.frequency:.5g}Hz"
     dwell = f"{1e3 / state.frequency:.6g}ms"
-    middle = f"{0.5e6 * sum(range_of(desk)):.5g}"
-    half = f"{0.5e6 * (range_of(desk)[1] - range_of(desk)[0]):.5g}"
-    pitch = f"{0.5e6 * (range_of(desk)[1] - range_of(desk)[0]) / max(state.steps, 1):.5g}"
+    middle = f"{0.5e6 * (bottom + top):.5g}"
+    half = f"{0.5e6 * (top - bottom):.5g}"
+    pitch = f"{0.5e6 * (top - bottom) / max(state.steps, 1):.5g}"
     duration = f",{LEARNING / state.frequency:.6g}s" if desk.state.loop.repetitive else ""
     texts = {
         "triangle": f"triangle:{rate},{low}..{high}um{duration}",
