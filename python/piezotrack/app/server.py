@@ -109,8 +109,8 @@ class Windows:
         return 0.0 if is_open else time.monotonic() - self.last_open
 
 
+class _Checked(RequestHandler):
     """Checks that every request goes through."""
-    """What every request goes through."""
 
     def initialize(self, windows: Windows) -> None:
         self.windows = windows
