@@ -18,9 +18,11 @@ import pytest
 
 from piezotrack.app import server
 from piezotrack.app.desk import Desk
+from piezotrack.errors import PiezotrackError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 WINDOW = "w" * 32
 
@@ -320,3 +322,14 @@ def test_a_large_file_ends_the_socket_not_the_server(served: Served) -> None:
     assert made.closed() == 1009
     assert time.monotonic() - begun < 5.0
     assert served.request().status == 200
+
+
+def test_what_cannot_be_served_is_one_sentence(served: Served, tmp_path: Path) -> None:
+    for given, words in (
+        ({"port": 99_999}, "port is 99999"),
+        ({"port": served.port}, f"port {served.port}"),
+        ({"log": tmp_path}, "is a folder"),
+        ({"log": tmp_path / "nothing.csv"}, "No such file"),
+    ):
+        with pytest.raises(PiezotrackError, match=words):
+            server.serve(lambda _: None, **given)

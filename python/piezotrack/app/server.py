@@ -6,9 +6,10 @@ import asyncio
 import json
 import time
 from importlib.resources import files
+from socket import create_server
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DataError
+from ..errors import DataError, ParameterError
 from .access import HEADERS, Access
 from .session import Session
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
 try:
     from tornado.httpserver import HTTPServer
-    from tornado.netutil import bind_sockets
     from tornado.web import Application, RequestHandler
     from tornado.websocket import WebSocketHandler
 except ImportError:
@@ -31,6 +31,7 @@ __all__ = ["serve"]
 MOST_SESSIONS, KEPT, IDLE = 8, 300.0, 600.0
 # Bytes of a file, and characters of any other message.
 LARGEST_FILE, LONGEST_MESSAGE = 64 * 2**20, 100_000
+HIGHEST_PORT = 65535
 # Seconds until a window has to say who it is.
 PATIENCE = 10.0
 # Codes of a closed socket, of those that applications may use.
@@ -289,11 +290,17 @@ def serve(
     Raises
     ------
     DataError
-        The log cannot be read.
+        The log cannot be read, or another program listens to the port.
+    ParameterError
+        `port` is none.
     """
+    if not 0 <= port <= HIGHEST_PORT:
+        raise ParameterError("port", port, f"0 to {HIGHEST_PORT}")
     if log is not None:
         try:
             size = log.stat().st_size
+            if log.is_dir():
+                raise DataError(f"{log} is a folder: expected a log")
         except OSError as error:
             raise DataError(f"{log}: {error.strerror}: expected a log") from None
         if size > LARGEST_FILE:
@@ -302,13 +309,18 @@ def serve(
 
 
 async def _serve(ready: Callable[[str], None], log: Path | None, port: int, idle: float) -> None:
-    (socket,) = bind_sockets(port, "127.0.0.1")
-    access = Access(socket.getsockname()[1])
+    try:
+        listening = create_server(("127.0.0.1", port))
+    except OSError as error:
+        raise DataError(f"port {port}: {error.strerror}: expected a free one, or 0") from None
+    listening.setblocking(False)
+    place = listening.getsockname()[1]
+    access = Access(place)
     windows = Windows(access, log)
     server = HTTPServer(application(windows), max_body_size=1024, max_header_size=16384)
-    server.add_sockets([socket])
+    server.add_sockets([listening])
     try:
-        ready(f"http://127.0.0.1:{socket.getsockname()[1]}/#token={access.token}")
+        ready(f"http://127.0.0.1:{place}/#token={access.token}")
         while windows.idle < idle:
             await asyncio.sleep(min(1.0, idle / 4.0))
             windows.drop_old()
