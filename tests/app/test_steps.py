@@ -7,14 +7,14 @@ import shlex
 import time
 import zipfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import piezotrack as pt
 from commands import ran
-from piezotrack.app.session import Session
+from page_window import Window
 from piezotrack.app.steps import PAGES, model
 from piezotrack.app.steps.closed_loop import controller_of, range_of, reach_of, run_of
 from piezotrack.app.steps.motion import controllers
@@ -22,48 +22,6 @@ from piezotrack.stages.registry import MODELS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from piezotrack.app.desk import Desk
-
-
-class Window:
-    """A session without a browser."""
-
-    def __init__(self) -> None:
-        self.answers: list[tuple[dict[str, Any], bytes | None]] = []
-        self.session = Session(lambda answer, content: self.answers.append((answer, content)))
-        self.desk: Desk = self.session.desk
-        self.parts: dict[str, dict[str, Any]] = {}
-
-    def do(self, do: str, **given: Any) -> tuple[dict[str, Any], bytes | None]:
-        """Send a message and wait for its answer."""
-        number, seen = 1 + len(self.answers), len(self.answers)
-        self.session.take({"do": do, "seq": f"{number}", **given})
-        until = time.monotonic() + 120.0
-        while time.monotonic() < until:
-            for answer, content in self.answers[seen:]:
-                if answer["seq"] == f"{number}":
-                    self.parts |= answer["changed"]
-                    return answer, content
-            time.sleep(0.005)
-        raise AssertionError(f"no answer to {do}")
-
-    def set(self, step: str, **values: Any) -> dict[str, Any]:
-        return self.do("set", step=step, values=values)[0]
-
-    def finish(self) -> None:
-        """Wait for what is computed in the background."""
-        until = time.monotonic() + 120.0
-        while self.desk.running:
-            assert time.monotonic() < until
-            time.sleep(0.02)
-        self.do("whole")
-
-    def take(self, name: str) -> tuple[str, bytes]:
-        answer, content = self.do(name)
-        assert answer["error"] is None, answer["error"]
-        assert content is not None
-        return answer["download"], content
 
 
 @pytest.fixture

@@ -20,10 +20,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from ..control.controller.controller import Controller
+    from .device import DeviceProcess
     from .parts import Light, Part
 
-__all__ = ["Desk", "Download", "Job", "Purpose", "Same", "Step"]
+__all__ = ["Desk", "Download", "Job", "Purpose", "Same", "Step", "drawing"]
 
+# Pictures are drawn by one window at a time.
+drawing = threading.Lock()
 # Results that are kept, the last used ones.
 KEPT = 64
 # What a file may be for.
@@ -108,7 +111,9 @@ class Desk:
     Parameters
     ----------
     changed : callable
-        Shows the page again, from any thread.
+        Shows the page again, from any thread, or does an action of it.
+    device : DeviceProcess, optional
+        The device that was named on the command line.
 
     Attributes
     ----------
@@ -124,9 +129,11 @@ class Desk:
         The controller of the last search, and the one that the person accepted.
     tuned_for : object
         Settings that the last search was for.
+    on_device : dict of str to object
+        What was recorded, played and learnt on the device, by name.
     """
 
-    def __init__(self, changed: Callable[[], None]) -> None:
+    def __init__(self, changed: Callable[[str], None], device: DeviceProcess | None = None) -> None:
         self.state = State()
         self.plotter = Plotter(800, {})
         self.suggested: Any = None
@@ -134,11 +141,17 @@ class Desk:
         self.accepted: Controller | None = None
         self.tuned_for: object = None
         self.jobs: dict[str, Job] = {}
+        self.on_device: dict[str, Any] = {}
+        self.device = device
         self._changed = changed
         self._folder = Path(tempfile.mkdtemp(prefix="piezotrack-"))
         self._files: dict[Purpose, Path] = {}
         self._results: OrderedDict[str, tuple[Any, list[object]]] = OrderedDict()
         self._lock = threading.Lock()
+
+    def changed(self, do: str = "refresh") -> None:
+        """Show the page again soon, or do an action of it; from any thread."""
+        self._changed(do)
 
     def at(self, state: State) -> Desk:
         """Return the desk as it is, but for its state: for a computation in the background."""
@@ -241,7 +254,7 @@ class Desk:
         """Begin a long computation, in place of the last one of that name."""
         if name in self.jobs:
             self.jobs[name].stop.set()
-        self.jobs[name] = job = Job(name, self._changed)
+        self.jobs[name] = job = Job(name, self.changed)
         threading.Thread(target=job.run, args=(work,), daemon=True, name=name).start()
 
     def stop(self) -> None:

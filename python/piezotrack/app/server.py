@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DataError, ParameterError
 from .access import HEADERS, Access
+from .device import DeviceProcess
 from .session import Session
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ __all__ = ["serve"]
 # Windows at once; seconds that the desk of a closed one is kept, and those without a window after
 # which the server ends.
 MOST_SESSIONS, KEPT, IDLE = 8, 300.0, 600.0
+# Seconds without a window after which a device is stopped: longer than a page takes to load again.
+GRACE = 3.0
 # Bytes of a file, and characters of any other message.
 LARGEST_FILE, LONGEST_MESSAGE = 64 * 2**20, 100_000
 HIGHEST_PORT = 65535
@@ -53,11 +56,14 @@ class Windows:
         Who may reach them.
     log : pathlib.Path or None
         Log that a new window begins with.
+    device : DeviceProcess or None
+        The device that was named on the command line; one window at a time uses it.
     """
 
-    def __init__(self, access: Access, log: Path | None) -> None:
+    def __init__(self, access: Access, log: Path | None, device: DeviceProcess | None) -> None:
         self.access = access
         self.log = log
+        self.device = device
         self.sessions: dict[str, tuple[Session, Socket | None, float]] = {}
         self.last_open = time.monotonic()
 
@@ -75,7 +81,7 @@ class Windows:
                 self.end(idle[0])
             if len(self.sessions) >= MOST_SESSIONS:
                 return None
-            session = Session(socket.from_thread)
+            session = Session(socket.from_thread, self.device)
             if self.log is not None:
                 content = {"name": self.log.name, "content": self.log.read_bytes()}
                 session.take({"do": "open", "purpose": "log", **content})
@@ -97,6 +103,11 @@ class Windows:
         for key, (_, socket, since) in list(self.sessions.items()):
             if socket is None and now - since > KEPT:
                 self.end(key)
+
+    def halt(self) -> None:
+        """Lead the output of the device to rest, whichever window moves it."""
+        if self.device is not None:
+            self.device.stop()
 
     def end(self, window: str) -> None:
         """End a session."""
@@ -210,6 +221,9 @@ class Socket(WebSocketHandler):
             self.close(1003, "expected an object in JSON")
         elif self.session is None:
             self._enter(given)
+        elif given.get("do") == "halt":
+            # At once: the worker may compute.
+            self.windows.halt()
         elif given.get("do") == "open":
             self.upcoming = given
         else:
@@ -272,6 +286,7 @@ def serve(
     *,
     log: Path | None = None,
     port: int = 0,
+    device: str | None = None,
     idle: float = IDLE,
 ) -> None:
     """Serve the page to this computer until it is interrupted or no window has been open for long.
@@ -284,6 +299,9 @@ def serve(
         Log that a new window begins with.
     port : int, optional
         TCP port; any free one where it is 0.
+    device : str, optional
+        Address of a device that the page may use; its output is led to rest when the last window
+        closes and when the server ends.
     idle : float, optional
         Seconds without a window after which it ends.
 
@@ -292,7 +310,9 @@ def serve(
     DataError
         The log cannot be read, or another program listens to the port.
     ParameterError
-        `port` is none.
+        `port` is none, or `device` is no address.
+    DeviceError
+        The device does not answer.
     """
     if not 0 <= port <= HIGHEST_PORT:
         raise ParameterError("port", port, f"0 to {HIGHEST_PORT}")
@@ -305,10 +325,21 @@ def serve(
             raise DataError(f"{log}: {error.strerror}: expected a log") from None
         if size > LARGEST_FILE:
             raise DataError(f"{log} has {size} bytes: expected {LARGEST_FILE} at most")
-    asyncio.run(_serve(ready, log, port, idle))
+    used = None if device is None else DeviceProcess(device)
+    try:
+        asyncio.run(_serve(ready, log, port, idle, used))
+    finally:
+        if used is not None:
+            used.close()
 
 
-async def _serve(ready: Callable[[str], None], log: Path | None, port: int, idle: float) -> None:
+async def _serve(
+    ready: Callable[[str], None],
+    log: Path | None,
+    port: int,
+    idle: float,
+    device: DeviceProcess | None,
+) -> None:
     try:
         listening = create_server(("127.0.0.1", port))
     except OSError as error:
@@ -316,7 +347,7 @@ async def _serve(ready: Callable[[str], None], log: Path | None, port: int, idle
     listening.setblocking(False)
     place = listening.getsockname()[1]
     access = Access(place)
-    windows = Windows(access, log)
+    windows = Windows(access, log, device)
     server = HTTPServer(application(windows), max_body_size=1024, max_header_size=16384)
     server.add_sockets([listening])
     try:
@@ -324,6 +355,8 @@ async def _serve(ready: Callable[[str], None], log: Path | None, port: int, idle
         while windows.idle < idle:
             await asyncio.sleep(min(1.0, idle / 4.0))
             windows.drop_old()
+            if windows.idle > GRACE:
+                windows.halt()
     finally:
         server.stop()
         for window in list(windows.sessions):

@@ -18,6 +18,7 @@ from .steps import PAGES
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from .device import DeviceProcess
     from .parts import Part
 
     Send = Callable[[dict[str, Any], bytes | None], None]
@@ -40,11 +41,13 @@ class Session:
     ----------
     send : callable
         Sends a message, and a file with it, to the window; from any thread.
+    device : DeviceProcess, optional
+        The device that was named on the command line.
     """
 
-    def __init__(self, send: Send) -> None:
+    def __init__(self, send: Send, device: DeviceProcess | None = None) -> None:
         self.send = send
-        self.desk = Desk(self.refresh)
+        self.desk = Desk(self.refresh, device)
         self._past: list[State] = []
         self._future: list[State] = []
         self._last_live: object = None
@@ -66,9 +69,9 @@ class Session:
             self._waiting[key] = given
             self._condition.notify()
 
-    def refresh(self) -> None:
-        """Show the page again, soon."""
-        timer = threading.Timer(PACE, self.take, [{"do": "refresh"}])
+    def refresh(self, do: str = "refresh") -> None:
+        """Show the page again, or do an action of it, soon."""
+        timer = threading.Timer(PACE, self.take, [{"do": do}])
         timer.daemon = True
         timer.start()
 
@@ -225,6 +228,7 @@ class Session:
             "undo": bool(self._past),
             "redo": bool(self._future),
             "running": ", ".join(desk.running),
+            "device": desk.device is not None,
         }
 
 

@@ -16,11 +16,22 @@ from ..errors import DataError, ParameterError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["STEPS", "LogState", "LoopState", "ModelState", "MotionState", "State", "UseState"]
+__all__ = [
+    "STEPS",
+    "DeviceState",
+    "LogState",
+    "LoopState",
+    "ModelState",
+    "MotionState",
+    "State",
+    "UseState",
+]
 
 FORMAT = "piezotrack-state"
 SCHEMA_VERSION = 1
 STEPS = ("log", "model", "motion", "loop", "use")
+# What has settings: the steps, and the device that several of them use.
+PARTS = (*STEPS, "device")
 # Characters of a text and entries of a list, at most.
 LONGEST, MOST = 2000, 200
 
@@ -45,6 +56,8 @@ class LogState:
         As of `piezotrack.read`.
     resample : float or None
         As of `piezotrack.read` [s].
+    hold : {"foh", "zoh"}
+        As of `piezotrack.read`.
     decimate : int
         As of `Dataset.decimate`.
     zero : bool
@@ -61,6 +74,7 @@ class LogState:
     dt: float | None = None
     missing: Literal["drop", "fill"] | None = None
     resample: float | None = None
+    hold: Literal["foh", "zoh"] = "foh"
     decimate: int = 1
     zero: bool = False
     window: Span | None = None
@@ -199,6 +213,35 @@ class UseState:
 
 
 @dataclass(frozen=True)
+class DeviceState:
+    """Settings of the device that was named on the command line.
+
+    Attributes
+    ----------
+    low, high : float or None
+        Lowest and highest voltage [V]; None for those of the device.
+    wave : str
+        Drive of a record, one of `piezotrack.hardware.parse_drive`.
+    frequency : float
+        Its frequency [Hz].
+    rate : float or None
+        Sampling rate of a record [Hz]; None for 1 kHz, or the nearest that the device has.
+    trials : int
+        Trials of learning, at most.
+    zero : bool
+        Whether readings count from where the device rests.
+    """
+
+    low: float | None = None
+    high: float | None = None
+    wave: Literal["decaying", "triangle", "sine", "staircase"] = "decaying"
+    frequency: float = 1.0
+    rate: float | None = None
+    trials: int = 10
+    zero: bool = False
+
+
+@dataclass(frozen=True)
 class State:
     """Settings of all steps, and the step that is shown."""
 
@@ -208,6 +251,7 @@ class State:
     motion: MotionState = field(default_factory=MotionState)
     loop: LoopState = field(default_factory=LoopState)
     use: UseState = field(default_factory=UseState)
+    device: DeviceState = field(default_factory=DeviceState)
 
     def changed(self, step: str, values: Mapping[str, Any]) -> State:
         """Return the state with some settings of a step changed.
@@ -215,7 +259,7 @@ class State:
         Parameters
         ----------
         step : str
-            One of `STEPS`.
+            One of the steps, or "device".
         values : mapping of str to object
             New values by name, as JSON has them.
 
@@ -229,8 +273,8 @@ class State:
         ParameterError
             There is no such setting, or a value is not of its kind.
         """
-        if step not in STEPS:
-            raise ParameterError("step", quoted(step), f"one of {', '.join(STEPS)}")
+        if step not in PARTS:
+            raise ParameterError("step", quoted(step), f"one of {', '.join(PARTS)}")
         part = getattr(self, step)
         whole: dict[str, Any] = {}
         for key, value in values.items():
@@ -289,7 +333,7 @@ class State:
                 f"schema_version of the state is {quoted(version)}: expected {SCHEMA_VERSION}"
             )
         state = cls()
-        for step in STEPS:
+        for step in PARTS:
             if not isinstance(values := found.get(step, {}), dict):
                 raise ParameterError(step, quoted(values), "settings by name")
             state = state.changed(step, values)

@@ -95,6 +95,7 @@ function receive(answer) {
   $("undo").disabled = !answer.undo;
   $("redo").disabled = !answer.redo;
   $("stop").hidden = !answer.running;
+  $("halt").hidden = !answer.device;
   $("running").textContent = answer.running ? `computing: ${answer.running}` : "";
   const fault = answer.error;
   if (answer.seq || fault) say(fault && !faultAt(main, fault.control, fault.text) ? fault.text : "");
@@ -157,11 +158,13 @@ function theme(name) {
 $("undo").onclick = () => send({ do: "undo" });
 $("redo").onclick = () => send({ do: "redo" });
 $("stop").onclick = () => send({ do: "stop" });
+$("halt").onclick = () => send({ do: "halt" });
 $("keys").onclick = () => $("help").showModal();
 $("theme").onclick = () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
 $("error").onclick = () => ($("error").hidden = true);
 
 document.addEventListener("keydown", (event) => {
+  if (event.key === "Escape" && !$("halt").hidden) send({ do: "halt" });
   const typing = event.target.matches("input[type=text], input[type=number], select, textarea");
   const key = event.key.toLowerCase();
   if ((event.ctrlKey || event.metaKey) && (key === "z" || key === "y")) {

@@ -436,7 +436,7 @@ export class Chart {
       const half = ((x1 - x0) / 2) * (event.key === "+" ? 0.5 : 2);
       const a = Math.max(inside - half, this.whole[0]), b = Math.min(inside + half, this.whole[1]);
       this.zoom(a <= this.whole[0] && b >= this.whole[1] ? null : [a, b, y0, y1]);
-    } else if (event.key === "0" || event.key === "Escape") this.zoom(null);
+    } else if (event.key === "0") this.zoom(null);
     else return;
     event.preventDefault();
     event.stopPropagation();

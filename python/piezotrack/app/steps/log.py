@@ -19,6 +19,7 @@ from ...identification.fit import identify
 from .. import parts
 from ..code import call, command, given, plain
 from ..desk import Download, Same
+from .device import RECORDING, recording
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -89,7 +90,7 @@ def record_of(desk: Desk) -> Dataset:
     path = desk.file("log", state.source)
 
     def compute() -> Dataset:
-        log = read(path, **columns_of(state), resample=state.resample)
+        log = read(path, **columns_of(state), resample=state.resample, hold=state.hold)
         log = log if state.decimate <= 1 else log.decimate(state.decimate)
         return log.zeroed() if state.zero else log
 
@@ -144,9 +145,10 @@ class LogStep:
                     "example",
                     parts.action("Take the measured example", "log.example", primary=True),
                 ),
+                *recording(desk),
             ]
         found = info_of(desk)
-        page = [opening, _columns(state, found)]
+        page = [opening, *recording(desk), _columns(state, found)]
         try:
             log = record_of(desk)
             part = window_of(desk)
@@ -171,7 +173,11 @@ class LogStep:
         if not state.source:
             return []
         reading = call(
-            "log = pt.read", repr(state.source), **columns_of(state), resample=state.resample
+            "log = pt.read",
+            repr(state.source),
+            **columns_of(state),
+            resample=state.resample,
+            hold=None if state.hold == "foh" else state.hold,
         )
         lines = ["import piezotrack as pt", "", reading]
         if state.decimate > 1:
@@ -190,8 +196,9 @@ class LogStep:
 
     @property
     def actions(self) -> Mapping[str, Callable[[Desk, Mapping[str, Any]], Download | None]]:
-        """The example, and the drive to record next."""
-        return {"example": _example, "suggest": _suggest, "suggested": _suggested}
+        """The example, the drive to record next, and what a device does."""
+        own = {"example": _example, "suggest": _suggest, "suggested": _suggested}
+        return {**own, **RECORDING}
 
 
 def _reading(state: LogState) -> dict[str, Any]:
@@ -212,6 +219,7 @@ def log_options(state: LogState) -> dict[str, Any]:
     return {
         **_reading(state),
         "resample": None if state.resample is None else f"{plain(state.resample)}s",
+        "hold": None if state.hold == "foh" else state.hold,
         "decimate": state.decimate if state.decimate > 1 else None,
         "zero": state.zero,
         "window": None if window is None else f"{plain(window[0])}:{plain(window[1])}",
@@ -270,6 +278,8 @@ def _columns(state: LogState, found: LogInfo) -> Part:
             [(None, "refuse"), ("drop", "leave out"), ("fill", "interpolate")],
         )
     )
+    holds = [("foh", "linear"), ("zoh", "constant")]
+    items.append(parts.select("hold", "Drive between samples", state.hold, holds))
     items.append(parts.check("zero", "Count from the first reading", state.zero))
     items.append(parts.number("dt", "Interval, where there are no times", state.dt, "s"))
     title = f"{found.source}: {found.format}, {len(found.columns)} columns"

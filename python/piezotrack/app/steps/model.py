@@ -101,12 +101,14 @@ def test_of(desk: Desk) -> Dataset:
     path = desk.file("test", state.test)
 
     def compute() -> Dataset:
-        log = read(path, missing=desk.state.log.missing)
+        log = read(path, missing=desk.state.log.missing, hold=desk.state.log.hold)
         log = log.zeroed() if desk.state.log.zero else log
         return log if state.test_from <= log.t[0] else log[state.test_from :]
 
     found: Dataset = desk.result(
-        "test", [stamp(path), state.test_from, desk.state.log.zero], compute
+        "test",
+        [stamp(path), state.test_from, desk.state.log.zero, desk.state.log.hold],
+        compute,
     )
     return found
 
@@ -202,7 +204,9 @@ class ModelStep:
         else:
             cut = ".zeroed()" if desk.state.log.zero else ""
             cut += f"[{plain(state.test_from)}:]" if state.test_from else ""
-            keywords = given({"missing": desk.state.log.missing})
+            log = desk.state.log
+            hold = None if log.hold == "foh" else log.hold
+            keywords = given({"missing": log.missing, "hold": hold})
             lines += ["train = log", f"{call('test = pt.read', repr(state.test), **keywords)}{cut}"]
         lines.append(call("fit = pt.identify", "train", repr(trial.info.name), **arguments))
         return [*lines, "print(fit.summary())", "print(fit.score(test))"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import threading
 import zipfile
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,7 @@ from ...errors import DataError, ParameterError
 from ...export.write import export_controller
 from .. import parts
 from ..code import Code, call, command
-from ..desk import Download
+from ..desk import Download, drawing
 from .closed_loop import (
     by_hand,
     controller_of,
@@ -32,6 +31,7 @@ from .log import LogStep, window_of
 from .loop import LoopStep
 from .model import ModelStep, chosen_trial, fit_of
 from .motion import motion_word
+from .on_device import RUNNING, running
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -58,8 +58,6 @@ PICTURES = {
 }
 # Date of the files in an archive: the same result gives the same archive.
 DATE = (1980, 1, 1, 0, 0, 0)
-# Pictures are drawn by one window at a time.
-drawing = threading.Lock()
 
 
 class UseStep:
@@ -80,7 +78,7 @@ class UseStep:
         if not desk.state.log.source or chosen_trial(desk) is None:
             return [parts.needs("model", "Fit a model first.")]
         use = desk.state.use
-        running = "tuning" in desk.running
+        tuning = "tuning" in desk.running
         form = parts.controls(
             "form",
             "Controller for firmware and other programs",
@@ -89,7 +87,7 @@ class UseStep:
             parts.check("single", "Numbers of 4 bytes", use.single),
             step="use",
         )
-        form["buttons"] = [parts.action("Export", "use.export", primary=True, disabled=running)]
+        form["buttons"] = [parts.action("Export", "use.export", primary=True, disabled=tuning)]
         pictures = parts.controls(
             "pictures",
             "Pictures",
@@ -100,11 +98,11 @@ class UseStep:
         )
         pictures["buttons"] = [parts.action("Save picture", "use.picture")]
         return [
-            *([parts.messages("wait", parts.message("grey", WAIT))] if running else []),
+            *([parts.messages("wait", parts.message("grey", WAIT))] if tuning else []),
             form,
             parts.buttons(
                 "files",
-                parts.action("Controller", "use.controller", disabled=running),
+                parts.action("Controller", "use.controller", disabled=tuning),
                 parts.action("Model", "use.model"),
                 parts.action("Voltage as a table", "use.table"),
                 parts.action("Motion", "motion.csv"),
@@ -112,6 +110,7 @@ class UseStep:
                 parts.action("Script", "use.script"),
                 parts.action("State of this page", "use.state"),
             ),
+            *running(desk),
             pictures,
             parts.code("script", "All steps in Python", "\n".join(self.python(desk)), open=True),
             parts.code("commands", "and as commands", "\n".join(self.commands(desk)), open=True),
@@ -173,6 +172,7 @@ class UseStep:
             "report": _report,
             "script": _script,
             "state": _state,
+            **RUNNING,
         }
 
 

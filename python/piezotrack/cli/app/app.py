@@ -13,6 +13,10 @@ __all__ = ["app_command"]
 @command()
 def app_command(
     log: Annotated[Path | None, Argument("Log that the page begins with", "FILE")] = None,
+    device: Annotated[
+        str | None,
+        Option("Device to record, play and learn on, as of `measure`", metavar="ADDRESS"),
+    ] = None,
     port: Annotated[int, Option("TCP port, 0 for any free one")] = 0,
     browser: Annotated[bool, Option("Open the browser; default yes")] = True,
 ) -> None:
@@ -30,4 +34,4 @@ def app_command(
         if browser:
             webbrowser.open(address)
 
-    serve(ready, log=log, port=port)
+    serve(ready, log=log, port=port, device=device)
