@@ -12,6 +12,7 @@ from .._support.messages import quoted
 from ..errors import ParameterError, PiezotrackError
 from .desk import Desk, Download
 from .parts import Plotter, message, messages
+from .pictures import picture
 from .state import STEPS, State
 from .steps import PAGES
 
@@ -134,6 +135,8 @@ class Session:
             desk.stop()
         elif do == "open":
             self._open(given)
+        elif do == "picture":
+            return picture(desk, PAGES[desk.state.step].page, str(given.get("chart")))
         else:
             step, _, name = str(do).partition(".")
             function = PAGES[step].actions.get(name) if step in PAGES else None

@@ -196,8 +196,6 @@ class UseState:
         Of its files and functions.
     single : bool
         Whether numbers in C have 4 bytes.
-    panel : str
-        Which picture.
     width : int
         Width of pictures [mm].
     picture : str
@@ -207,7 +205,6 @@ class UseState:
     to: Literal["c99", "library", "json", "fmu"] = "c99"
     name: str = "controller"
     single: bool = False
-    panel: Literal["log", "loop", "time", "residual", "tracking", "margins"] = "loop"
     width: Literal[85, 170] = 85
     picture: Literal["pdf", "svg", "png"] = "pdf"
 

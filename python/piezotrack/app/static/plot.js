@@ -63,13 +63,14 @@ export class Chart {
     this.element.className = "chart";
     this.element.innerHTML =
       '<figcaption><h3></h3><button type="button" class="all" hidden>Show all</button>' +
-      '<button type="button" class="rows" aria-expanded="false">Show as table</button></figcaption>' +
+      '<button type="button" class="picture">Picture</button><button type="button" class="rows" aria-expanded="false">Show as table</button></figcaption>' +
       '<div class="plot"><canvas></canvas><canvas role="img" tabindex="0"></canvas></div>' +
       '<div class="legend"></div><p class="sentence"></p><div class="scroll" hidden></div>';
     this.box = this.element.querySelector(".plot");
     [this.base, this.over] = this.element.querySelectorAll("canvas");
     this.legend = this.element.querySelector(".legend");
     this.element.querySelector(".all").onclick = () => this.zoom(null);
+    this.element.querySelector(".picture").onclick = () => this.send({ do: "picture", chart: this.part.id });
     this.element.querySelector(".rows").onclick = (event) => this.toggleTable(event.target);
     this.over.onpointerdown = (event) => this.press(event);
     this.over.onpointermove = (event) => this.move(event);

@@ -104,7 +104,7 @@ def first(desk: Desk, step: str) -> list[Part]:
         )
         page.append(parts.messages("stroke-first", parts.message("amber", words)))
     log: Dataset | None = desk.on_device.get("stroke")
-    if log is not None:
+    if log is not None and not desk.state.log.source:
         page.append(_stroke_chart(desk, log))
     return page
 

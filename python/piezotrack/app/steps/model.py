@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["ModelStep", "chosen_trial", "fit_of", "model_options", "test_of"]
 
 # Those that take the least time, first; then all others.
-FIRST = ("first-order-dahl", "dahl", "lugre", "duhem", "bouc-wen", "prandtl-ishlinskii")
+FIRST = ("duhem", "dahl", "prandtl-ishlinskii", "lugre", "bouc-wen")
 # Shares of a window that may be fitted.
 LEAST, MOST = 0.2, 0.9
 # Rms error in shares of the stroke below which a model is good, and above which it is not.
@@ -55,7 +55,10 @@ class Trial:
     running: bool = False
     # Simulations and best cost [m], after each iteration of a search.
     course: list[tuple[int, float]] = field(default_factory=list)
+    # What takes time, of a model that is looked at: how far off it may be, and its summary.
+    looked_at: bool = False
     band: PredictionBand | None = None
+    summary: str = ""
 
 
 @dataclass
@@ -179,7 +182,7 @@ class ModelStep:
             page.append(course)
         trial = chosen_trial(desk)
         if trial is not None and trial.fit is not None:
-            page += _of_model(desk, trial)
+            page += [*_of_model(desk, trial), *desk.faults("certainty")]
             page += [
                 parts.code("code", "The same in Python", "\n".join(self.python(desk))),
                 parts.code("command", "and as a command", "\n".join(self.commands(desk))),
@@ -357,6 +360,8 @@ def _of_model(desk: Desk, trial: Trial) -> list[Part]:
     fit, (_, test, _) = trial.fit, parts_of(desk)
     if fit is None:
         return []
+    if not trial.looked_at and not {"models", "certainty"} & set(desk.running):
+        _look_at(desk, trial, fit, test)
     key = [Same(fit), Same(test)]
     x = desk.result("test run", key, lambda: fit.simulate(test).x)
     unit, scale = best_length_unit(test.stroke)
@@ -405,12 +410,32 @@ def _of_model(desk: Desk, trial: Trial) -> list[Part]:
             ],
         ),
     ]
-    rows = [*of_stage(fit), *of_sensor(fit.records[0], fit.data), *errors_of(fit, 0)]
-    rows += [*predicted(fit), ("on the test", str(trial.score))]
+    rows = desk.result("quantities", key, lambda: _quantities(trial, fit))
     notes = [parts.message("amber", note) for note in fit.notes]
     notes += [parts.message("amber", note) for note in (trial.score.notes if trial.score else ())]
     table = parts.table("quantities", "The stage", ("", ""), rows)
-    return [*pictures, table, *([parts.messages("notes", *notes)] if notes else [])]
+    page = [*pictures, table, *([parts.messages("notes", *notes)] if notes else [])]
+    if trial.summary:
+        page.append(parts.code("summary", "All parameters, with what is sure", trial.summary))
+    return page
+
+
+def _quantities(trial: Trial, fit: Identification) -> list[tuple[str, str]]:
+    """Return the quantities of the stage and the errors; +- is half of the interval of 95 %."""
+    rows = [*of_stage(fit), *of_sensor(fit.records[0], fit.data), *errors_of(fit, 0)]
+    return [*rows, *predicted(fit), ("on the test", str(trial.score))]
+
+
+def _look_at(desk: Desk, trial: Trial, fit: Identification, test: Dataset) -> None:
+    """Compute how far off a model may be, and its summary, in the background."""
+    trial.looked_at = True
+
+    def work(job: Job) -> None:
+        trial.band = fit.prediction_band(test)
+        job.changed()
+        trial.summary = fit.summary()
+
+    desk.start("certainty", work)
 
 
 def _begin(desk: Desk, _: Mapping[str, Any]) -> None:
@@ -426,9 +451,6 @@ def _begin(desk: Desk, _: Mapping[str, Any]) -> None:
                 break
             if trial.fit is None:
                 _fit(trial, train, test, arguments, job)
-        best = next(iter(trials.done), None)
-        if best is not None and best.fit is not None and not job.stop.is_set():
-            best.band = best.fit.prediction_band(test)
 
     desk.start("models", work)
 

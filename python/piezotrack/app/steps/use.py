@@ -7,8 +7,7 @@ import json
 import zipfile
 from typing import TYPE_CHECKING, Any
 
-from ..._support.display.look import figure_style
-from ..._support.files.writing import save_figures, write_columns
+from ..._support.files.writing import write_columns
 from ..._support.units import drive_word, shown_unit
 from ...control.controller.load import load_controller
 from ...errors import DataError, ParameterError
@@ -24,10 +23,9 @@ from .closed_loop import (
     model_of,
     reference_of,
     report_of,
-    run_of,
     tuned_of,
 )
-from .log import LogStep, window_of
+from .log import LogStep
 from .loop import LoopStep
 from .model import ModelStep, chosen_trial, fit_of
 from .motion import motion_word
@@ -47,14 +45,6 @@ FORMS = {
     "library": "C with libpiezotrack",
     "json": "coefficients",
     "fmu": "FMU for co-simulation",
-}
-PICTURES = {
-    "log": "the log",
-    "loop": "loop of the model",
-    "time": "motion and error of the model",
-    "residual": "residual of the model",
-    "tracking": "tracked motion",
-    "margins": "margins of the loop",
 }
 # Date of the files in an archive: the same result gives the same archive.
 DATE = (1980, 1, 1, 0, 0, 0)
@@ -90,13 +80,11 @@ class UseStep:
         form["buttons"] = [parts.action("Export", "use.export", primary=True, disabled=tuning)]
         pictures = parts.controls(
             "pictures",
-            "Pictures",
-            parts.select("panel", "Picture", use.panel, list(PICTURES.items())),
+            "Pictures: each chart of the page has a button for its file",
             parts.select("width", "Width", use.width, [(85, "85 mm"), (170, "170 mm")]),
             parts.select("picture", "Format", use.picture, [(f, f) for f in ("pdf", "svg", "png")]),
             step="use",
         )
-        pictures["buttons"] = [parts.action("Save picture", "use.picture")]
         return [
             *([parts.messages("wait", parts.message("grey", WAIT))] if tuning else []),
             form,
@@ -168,7 +156,6 @@ class UseStep:
             "controller": _controller,
             "model": _model,
             "table": _table,
-            "picture": _picture,
             "report": _report,
             "script": _script,
             "state": _state,
@@ -243,24 +230,6 @@ def _table(desk: Desk, _: Mapping[str, Any]) -> Download:
         "displacement_um": 1e6 * samples.x,
     }
     path = write_columns(desk.place("table") / "feedforward.csv", columns)
-    return Download(path.name, path.read_bytes())
-
-
-def _picture(desk: Desk, _: Mapping[str, Any]) -> Download:
-    """Draw one picture at the width of a column or of a page."""
-    use = desk.state.use
-    controller = controller_of(desk)
-    fit = fit_of(desk)
-    draw: dict[str, Callable[[], Any]] = {
-        "log": lambda: window_of(desk).plot(),
-        "loop": lambda: fit.plot_loop().figure,
-        "time": lambda: fit.plot_time()[0].figure,
-        "residual": lambda: fit.plot_residual(),
-        "tracking": lambda: run_of(desk, controller).plot(),
-        "margins": lambda: report_of(desk, controller).plot(),
-    }
-    with drawing, figure_style("paper", width=f"{use.width}mm", formats=[use.picture]):
-        (path,) = save_figures({use.panel: draw[use.panel]()}, desk.place("picture"))
     return Download(path.name, path.read_bytes())
 
 

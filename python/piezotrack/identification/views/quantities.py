@@ -13,7 +13,7 @@ from ..confidence.sensitivity import gradient
 from ..fitted.notes import start_notes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from ...data.dataset import Dataset
     from ..fitted.drift import Drift
@@ -63,10 +63,9 @@ def of_stage(model: IdentifiedModel) -> list[Row]:
         Name, and value with its unit.
     """
     stage = model.model
-    rows = [*_loop(model), *_creep(stage)]
-    lag = stage.damping / stage.stiffness if hasattr(stage, "stiffness") else stage.time_constant
-    if lag:
-        rows.append(("lag", f"{1e3 * lag:.3g} ms"))
+    rows = [*_loop(model), *_creep(model)]
+    if lag := _lag(stage):
+        rows.append(("lag", f"{1e3 * lag:.3g}{_reach(model, _lag, 1e3)} ms"))
     if getattr(stage, "frequency", None) is not None:
         modes = [stage.frequency, *stage.mode_frequencies]
         rows.append(("mode", f"{', '.join(f'{one:.4g}' for one in modes)} Hz"))
@@ -189,34 +188,44 @@ def _loop(model: IdentifiedModel) -> list[Row]:
     unit, scale = shown_unit(f"m/{per}")
     if unit == "m/N":
         unit, scale = "um/N", 1e6
-    reach = scale * _reach(model)
-    spread = f" +- {reach:.1g}" if math.isfinite(reach) else ""
-    rows = [("gain", f"{scale * loop.gain:.4g}{spread} {unit}")]
+    ends = model.drive_range or (0.0, 0.0)
+    gain = _reach(model, lambda stage: SlowLoop.of(stage, *ends).gain, scale)
+    rows = [("gain", f"{scale * loop.gain:.4g}{gain} {unit}")]
     if loop.width > CLOSED * abs(loop.travel):
-        share = f"{loop.width_percent:.3g} % of the travel"
+        width = _reach(model, lambda stage: SlowLoop.of(stage, *ends).width_percent)
+        share = f"{loop.width_percent:.3g}{width} % of the travel"
         rows.append(("hysteresis", f"{share}, {length_text(loop.width, 3)}"))
     return rows
 
 
-def _reach(model: IdentifiedModel) -> float:
-    """Half of the 95 % interval of the gain of a fit [m/V]; not a number where it is not known."""
-    covariance = getattr(model, "covariance", None)
-    ends = model.drive_range
-    if covariance is None or ends is None:
-        return math.nan
-    return float(
-        covariance.reach(gradient(model, lambda near: SlowLoop.of(near.model, *ends).gain))
-    )
+def _reach(model: IdentifiedModel, quantity: Callable[[Any], float], scale: float = 1.0) -> str:
+    """Write half of the 95 % interval of a quantity of the stage; empty where it is not known."""
+    covariance = model.covariance
+    if covariance is None or model.drive_range is None:
+        return ""
+    reach = scale * float(covariance.reach(gradient(model, lambda near: quantity(near.model))))
+    return f" +- {reach:.1g}" if math.isfinite(reach) else ""
 
 
-def _creep(stage: Any) -> list[Row]:
+def _lag(stage: Any) -> float:
+    """Time constant of the first-order lag of a stage [s]."""
+    if hasattr(stage, "stiffness"):
+        return float(stage.damping / stage.stiffness)
+    return float(stage.time_constant or 0.0)
+
+
+def _creep(model: IdentifiedModel) -> list[Row]:
     """Share and time constant of each relaxation that is not 0."""
+    stage: Any = model.model
     parts = [(w, t) for w, t in zip(stage.creep_weights, stage.creep_times, strict=True) if w]
     if not parts:
         return []
     each = ", ".join(f"{100.0 * w:.2g} % in {t:.3g} s" for w, t in parts)
-    whole = f"{100.0 * math.fsum(w for w, _ in parts):.2g} %: " if len(parts) > 1 else ""
-    return [("creep", f"{whole}{each}")]
+    reach = _reach(model, lambda stage: math.fsum(stage.creep_weights), 100.0)
+    if len(parts) == 1 and not reach:
+        return [("creep", each)]
+    whole = f"{100.0 * math.fsum(w for w, _ in parts):.2g}{reach} %"
+    return [("creep", f"{whole}: {each}" if len(parts) > 1 else f"{whole} in {parts[0][1]:.3g} s")]
 
 
 def _drift(drift: Drift) -> str:
