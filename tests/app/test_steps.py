@@ -180,3 +180,37 @@ def test_a_state_is_the_same_page_again(window: Window) -> None:
     assert window.desk.state == before
     window.do("undo")
     assert window.desk.state.log.window is None
+
+
+def test_what_is_unusual_has_a_place_and_a_button(window: Window, tmp_path: Path) -> None:
+    t = np.arange(4000) / 200.0
+    u = 30.0 - 30.0 * np.cos(2.0 * np.pi * t / 2.0)
+    y = 5e-7 * u + np.where(t > 13.0, 2e-6, 0.0)
+    opened(window, pt.Dataset(u=u, y=y, t=t), tmp_path)
+    window.do("whole")
+    (flag,) = (one for one in window.parts["log.flags"]["items"] if one["fixes"])
+    assert "jumps" in flag["text"]
+    (region,) = window.parts["log.y"]["regions"]
+    assert (region["from"], region["to"]) == pytest.approx((13.0, 13.005))
+    (fix,) = flag["fixes"]
+    window.do(fix["do"], step=fix["step"], values=fix["values"])
+    assert window.desk.state.log.window == pytest.approx((0.0, 13.0))
+    assert not any("jumps" in one["text"] for one in window.parts["log.flags"]["items"])
+
+
+def test_swapped_columns_are_exchanged_by_a_button(window: Window, tmp_path: Path) -> None:
+    t = np.arange(4000) / 200.0
+    log = pt.VirtualStage.xu_li_2010(seed=1).record(30.0 - 30.0 * np.cos(np.pi * t), 0.005)
+    opened(window, log, tmp_path)
+    window.set("log", drive="displacement_m", displacement="voltage_V")
+    window.set("log", **{"units.displacement_m": "V", "units.voltage_V": "um"})
+    window.do("whole")
+    (fix,) = (
+        fix
+        for one in window.parts["log.flags"]["items"]
+        for fix in one["fixes"]
+        if "swap" in fix["label"]
+    )
+    window.do(fix["do"], step=fix["step"], values=fix["values"])
+    assert window.desk.state.log.drive == "voltage_V"
+    assert window.desk.state.log.displacement == "displacement_m"

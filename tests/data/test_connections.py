@@ -9,7 +9,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack.data.checks.connections import unusual_connection
-from piezotrack.data.checks.diagnostics import record_warnings
+from piezotrack.data.checks.record_flags import record_warnings
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,6 +12,7 @@ import pytest
 import piezotrack as pt
 from folders import MEASURED
 from piezotrack.data.checks import diagnostics
+from piezotrack.data.checks.record_flags import record_flags, record_warnings
 from piezotrack.xu_li_2010.demo import demo_log
 from records import BOX, HELD, quick
 from virtual import changed
@@ -56,14 +57,14 @@ GOOD = {
 def test_nothing_is_said_of_a_good_record(name: str) -> None:
     record = log(np.asarray(GOOD[name], dtype=np.float64))
     diagnostics.check_record(record, searches_hysteresis=True)
-    assert diagnostics.record_warnings(record) == []
+    assert record_warnings(record) == []
 
 
 @pytest.mark.parametrize("seconds", [4.0, 12.0])
 def test_nothing_is_said_of_the_demonstration(seconds: float) -> None:
     record = demo_log()[:seconds]
     diagnostics.check_record(record, searches_hysteresis=True)
-    assert diagnostics.record_warnings(record) == []
+    assert record_warnings(record) == []
 
 
 @pytest.mark.skipif(not MEASURED.is_dir(), reason=f"the measured logs are not in {MEASURED}")
@@ -72,7 +73,7 @@ def test_nothing_is_said_of_measured_logs() -> None:
         whole = pt.read(MEASURED / f"{name}.csv")
         for record in (whole, whole[3.0:], whole[3.0:23.0]):
             diagnostics.check_record(record, searches_hysteresis=True)
-            assert diagnostics.record_warnings(record) == []
+            assert record_warnings(record) == []
     # Of one slow sine, the Dahl model takes damping for a part of the loop's width.
     fit = pt.identify(
         pt.read(MEASURED / "training.csv")[3.0:23.0], "dahl", method=pt.Descents(seed=1)
@@ -102,7 +103,7 @@ def test_the_drive_before_the_window_counts() -> None:
     # The window only rises, but remembers cycles before.
     record = log(np.r_[SINE[:-1], SINE])[4.0:5.9]
     diagnostics.check_record(record, searches_hysteresis=True)
-    (note,) = diagnostics.record_warnings(record)
+    (note,) = record_warnings(record)
     assert "shorter than a period of the drive" in note
 
 
@@ -131,14 +132,14 @@ def test_the_core_refuses_first_what_tells_nothing() -> None:
     ],
 )
 def test_a_wrong_unit_is_named(drive: float, displacement: float, pieces: tuple[str, ...]) -> None:
-    (note,) = diagnostics.record_warnings(in_units(drive, displacement))
+    (note,) = record_warnings(in_units(drive, displacement))
     for piece in pieces:
         assert piece in note
 
 
 def test_a_wrong_unit_of_a_command_of_a_few_volts_is_named() -> None:
     # The measured stack gives 12.5 um/V; a thousandth of it is no stage's.
-    (note,) = diagnostics.record_warnings(in_units(3.6 / 75.0, 45.0 / 119.0 * 1e-3))
+    (note,) = record_warnings(in_units(3.6 / 75.0, 45.0 / 119.0 * 1e-3))
     assert "1e3 too small" in note
 
 
@@ -146,7 +147,7 @@ def test_a_wrong_unit_of_a_command_of_a_few_volts_is_named() -> None:
     "u", [SINE[:2400], 30.0 + 20.0 * np.sin(0.5 * np.pi * T[:2400]), 75.0 - SINE[:3000]]
 )
 def test_less_than_a_period_is_named(u: NDArray[np.float64]) -> None:
-    (note,) = diagnostics.record_warnings(log(u))
+    (note,) = record_warnings(log(u))
     assert "shorter than a period of the drive" in note
     ends = f"begins at {u[0]:.4g} V and ends at {u[-1]:.4g} V"
     ends += f", within {u.min():.4g} V to {u.max():.4g} V"
@@ -163,7 +164,7 @@ def test_less_than_a_period_is_named(u: NDArray[np.float64]) -> None:
 )
 def test_a_clipped_drive_is_named(u: NDArray[np.float64], levels: list[str]) -> None:
     # A record that begins at its lowest has no cut there at the beginning.
-    found = diagnostics.record_warnings(log(np.r_[u[:-1], u]))
+    found = record_warnings(log(np.r_[u[:-1], u]))
     assert len(found) == len(levels)
     for note, level in zip(found, levels, strict=True):
         assert f"the drive is cut off at {level}" in note
@@ -172,7 +173,7 @@ def test_a_clipped_drive_is_named(u: NDArray[np.float64], levels: list[str]) -> 
 def test_a_sensor_at_its_end_is_named() -> None:
     good = log(SINE)
     for y in (np.minimum(good.y, 90e-6), np.maximum(-good.y, -90e-6)):
-        note = diagnostics.record_warnings(pt.Dataset(u=good.u, y=y, dt=good.dt))[-1]
+        note = record_warnings(pt.Dataset(u=good.u, y=y, dt=good.dt))[-1]
         assert "90 um while the drive goes" in note
         assert "is the sensor or the stage at its end?" in note
 
@@ -221,3 +222,33 @@ def test_what_does_not_follow_the_loop_is_no_loops_fault(kind: str) -> None:
     percent = 100.0 * float(np.std(rest[kind])) / record.stroke
     assert percent > diagnostics.REMAINS
     assert diagnostics.fit_warnings(record, good.y, percent, ("a1", "a2"), ()) == []
+
+
+@pytest.mark.parametrize("size", [1e-6, -3e-6])
+def test_a_jump_of_the_sensor_is_found_where_it_is(size: float) -> None:
+    t = np.arange(4000) / 1000.0
+    noise = np.random.default_rng(1).normal(0.0, 3e-9, t.size)
+    u = 30.0 - 30.0 * np.cos(4.0 * np.pi * t)
+    y = 5e-7 * u + noise
+    assert record_flags(pt.Dataset(u=u, y=y, t=t)) == []
+    flags = record_flags(pt.Dataset(u=u, y=y + np.where(t > 2.3, size, 0.0), t=t))
+    (jump,) = (flag for flag in flags if flag.kind == "jump")
+    assert np.ravel(jump.spans) == pytest.approx([2.3, 2.301])
+    found = re.search(r"jumps by ([0-9.]+) ([un])m", jump.note)
+    assert found is not None
+    metres = float(found[1]) * {"u": 1e-6, "n": 1e-9}[found[2]]
+    assert metres == pytest.approx(abs(size), rel=0.02)
+
+
+def test_a_clipped_drive_and_a_sensor_at_its_end_are_found_where_they_are() -> None:
+    t = np.arange(4000) / 1000.0
+    u = 30.0 - 30.0 * np.cos(4.0 * np.pi * t)
+    clipped = record_flags(pt.Dataset(u=np.minimum(u, 50.0), y=5e-7 * np.minimum(u, 50.0), t=t))
+    (flag,) = (one for one in clipped if one.kind == "clipped")
+    assert len(flag.spans) == 8
+    for first, last in flag.spans:
+        middle = 0.5 * (first + last) % 0.5
+        assert middle == pytest.approx(0.25, abs=0.002)
+    ended = record_flags(pt.Dataset(u=u, y=np.minimum(5e-7 * u, 25e-6), t=t))
+    (flag,) = (one for one in ended if one.kind == "end")
+    assert len(flag.spans) == 8

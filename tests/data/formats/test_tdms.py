@@ -12,7 +12,7 @@ import piezotrack as pt
 from children import child
 from format_logs import DT, TEMPERATURE, T, U, Y, is_the_log, refusal, survives
 from log_writers import tdms, waveform
-from piezotrack.data.checks.diagnostics import record_warnings
+from piezotrack.data.checks.record_flags import record_warnings
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -9,9 +9,8 @@ import numpy as np
 
 from ..._support.units import best_length_unit, length_text, lookup, shown_unit
 from ...data import datasets
-from ...data.checks.diagnostics import record_warnings, runs
+from ...data.checks.diagnostics import runs
 from ...data.checks.log_info import info
-from ...data.checks.sampling_rate import spare_factor
 from ...data.reader import read
 from ...errors import DataError, PiezotrackError
 from ...identification.confidence.suggestion.suggested_drive import suggest_drive
@@ -20,6 +19,7 @@ from .. import parts
 from ..code import call, command, given, plain
 from ..desk import Download, Same
 from .device import RECORDING, recording
+from .flags import MARKED, ROLES, UNITS, fixes, flags, key, key_of, places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -47,14 +47,6 @@ SUBJECTS = {
     "mode": "Mode",
     "record": "Record",
 }
-ROLES = {"time": "Time", "drive": "Drive", "displacement": "Displacement"}
-UNITS = {
-    "time": ("s", "ms", "us"),
-    "drive": ("V", "mV", "kV", "N", "um"),
-    "displacement": ("m", "mm", "um", "nm"),
-}
-# Marks of single samples and of ranges that a picture has, at most.
-MARKED = 200
 # Length of a drive that is suggested [s].
 SUGGESTED = 30.0
 
@@ -153,11 +145,11 @@ class LogStep:
             log = record_of(desk)
             part = window_of(desk)
         except PiezotrackError as error:
-            fixes = _fixes(state, found)
-            return [*page, parts.messages("fault", parts.message("red", str(error), *fixes))]
+            mending = fixes(state, found)
+            return [*page, parts.messages("fault", parts.message("red", str(error), *mending))]
         return [
             *page,
-            _flags(state, found, log, part),
+            flags(desk, found, log, part),
             _drive_chart(desk, found, log, part),
             _displacement_chart(desk, part),
             _loop_chart(desk, part),
@@ -241,11 +233,10 @@ def _example(desk: Desk, _: Mapping[str, Any]) -> None:
 
 def _columns(state: LogState, found: LogInfo) -> Part:
     """Return lists for the columns and their units; what is missing is red."""
-    options = [(_key(i, one), _title(one)) for i, one in enumerate(found.columns)]
-    by_title = {one.title: _key(i, one) for i, one in enumerate(found.columns)}
+    options = [(key(i, one), _title(one)) for i, one in enumerate(found.columns)]
     items = []
     for role, label in ROLES.items():
-        chosen = getattr(state, role) or by_title.get(found.roles.get(role, ""))
+        chosen = getattr(state, role) or key_of(found, found.roles.get(role, ""))
         needed = role != "time" or (state.dt is None and found.time is None)
         items.append(
             parts.select(
@@ -256,7 +247,7 @@ def _columns(state: LogState, found: LogInfo) -> Part:
                 missing=needed and chosen is None,
             )
         )
-        column = next((c for i, c in enumerate(found.columns) if _key(i, c) == chosen), None)
+        column = next((c for i, c in enumerate(found.columns) if key(i, c) == chosen), None)
         if column is not None:
             unit = state.units.get(str(chosen)) or column.unit
             known = [one for one in UNITS[role] if lookup(one) is not None]
@@ -286,66 +277,10 @@ def _columns(state: LogState, found: LogInfo) -> Part:
     return parts.controls("columns", title, *items, step="log")
 
 
-def _key(index: int, column: ColumnInfo) -> str:
-    """Return how the readers are told of a column."""
-    return str(index) if column.title == f"column {index}" else column.title
-
-
 def _title(column: ColumnInfo) -> str:
     unit = f" [{column.unit}]" if column.unit else ""
     missing = f", {column.missing} missing" if column.missing else ""
     return f"{column.title}{unit}: {column.low:.4g} to {column.high:.4g}{missing}"
-
-
-def _fixes(state: LogState, found: LogInfo) -> list[Part]:
-    """Return buttons for what is probably wrong with a log that is not read."""
-    fixes = []
-    chosen = {role: getattr(state, role) or found.roles.get(role) for role in ROLES}
-    for role, title in chosen.items():
-        for i, column in enumerate(found.columns):
-            key = _key(i, column)
-            if title in (column.title, key) and not (column.unit or state.units.get(key)):
-                fixes += [
-                    _set(f"{column.title} is {unit}", {"units": {**state.units, key: unit}})
-                    for unit in UNITS[role][:3]
-                ]
-    lost = sum(c.missing for c in found.columns if c.title in chosen.values())
-    if lost and state.missing is None:
-        fixes.append(_set(f"leave out {lost} missing readings", {"missing": "drop"}))
-    time = found.time
-    if time is not None and state.resample is None and time.interval > 0.0:
-        uneven = bool(time.gaps) or time.jitter > 0.0
-        if uneven and not time.backward:
-            words = f"interpolate to {1.0 / time.interval:.4g} Hz"
-            fixes.append(_set(words, {"resample": time.interval}))
-    return fixes
-
-
-def _set(label: str, values: Mapping[str, Any]) -> Part:
-    """Return a button that changes settings of the log."""
-    return parts.action(label, "set", values, step="log")
-
-
-def _flags(state: LogState, found: LogInfo, log: Dataset, part: Dataset) -> Part:
-    """Return what a person should know of the record, with what mends it."""
-    items = [parts.message("amber", note) for note in dict.fromkeys(record_warnings(part))]
-    if found.time is not None and found.time.gaps:
-        gaps = found.time.gaps
-        words = f"{len(gaps)} gaps in the times, from {gaps[0][0]:.4g} to {gaps[0][1]:.4g} s first"
-        items.append(parts.message("amber", words))
-    factor = spare_factor(log.u, log.dt)
-    if factor > 1:
-        lower = 1.0 / (log.dt * factor)
-        words = f"{1.0 / log.dt:.4g} Hz are more than the drive needs"
-        fix = _set(f"thin to {lower:.4g} Hz", {"decimate": state.decimate * factor})
-        items.append(parts.message("amber", words, fix))
-    if state.decimate > 1 or state.resample is not None:
-        words = f"read at {1.0 / log.dt:.4g} Hz"
-        fix = _set("take all samples", {"decimate": 1, "resample": None})
-        items.append(parts.message("grey", words, fix))
-    if not items:
-        items = [parts.message("green", "nothing unusual was found in this part of the record")]
-    return parts.messages("flags", *items)
 
 
 def _drive_chart(desk: Desk, found: LogInfo, log: Dataset, part: Dataset) -> Part:
@@ -360,6 +295,7 @@ def _drive_chart(desk: Desk, found: LogInfo, log: Dataset, part: Dataset) -> Par
     regions = []
     if found.time is not None and desk.state.log.resample is None:
         regions = [parts.region(a, b, "gap", "bad") for a, b, _ in found.time.gaps[:MARKED]]
+    regions += places(desk, part, "clipped")
     span = f"{log.t[0]:.4g} to {log.t[-1]:.4g} s"
     words = (
         f"The drive from {span}, between {scale * log.u.min():.4g} and {scale * log.u.max():.4g} "
@@ -390,6 +326,7 @@ def _displacement_chart(desk: Desk, part: Dataset) -> Part:
             parts.region(float(part.t[a]), float(part.t[b - 1]), "missing", "bad")
             for a, b in runs(part.left_out)[:MARKED]
         ]
+    regions += [*places(desk, part, "end"), *places(desk, part, "jump")]
     far = np.flatnonzero(part.far)[:MARKED]
     if far.size:
         marks = parts.points(part.t[far], scale * y[far], "far off", "bad", marks=True)

@@ -1,17 +1,15 @@
-"""Diagnostics of a record: errors before an identification, warnings with its result."""
+"""Diagnostics of a record and of a fit: what is refused, and what the residual tells."""
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ... import _core
-from ..._support.units import best_length_unit, drive_text, length_text
+from ..._support.units import best_length_unit, drive_text
 from ...errors import DataError
-from .connections import unusual_connection
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
@@ -26,8 +24,8 @@ __all__ = [
     "amplitudes",
     "check_record",
     "fit_warnings",
+    "has_steps",
     "jumps",
-    "record_warnings",
     "runs",
     "turns",
 ]
@@ -36,18 +34,6 @@ __all__ = [
 TURN = 0.05
 # A change between two samples that counts as a step, as a share of the range.
 JUMP = 0.2
-# Largest distance of the window's ends in a closed period, as a share of the range.
-CLOSED = 0.1
-# A drive held at its extreme for this share of the window counts as clipped.
-CLIPPED = 0.1
-# Sampling interval of a record whose time is probably in ms [s].
-SELDOM = 0.5
-# Voltages [V], gains [m/V] and strokes [m] beyond which a piezo stage is implausible.
-TOO_MANY_VOLTS = 1500.0
-HIGHEST_GAIN, LONGEST = 2e-4, 5e-3
-LOWEST_GAIN, LOWEST_GAIN_OF_COMMAND, COMMAND_VOLTS, SHORTEST = 3e-9, 2e-8, 20.0, 1e-9
-# A typical stroke [m], to distinguish a factor of 1e3 from one of 1e6.
-USUAL = 30e-6
 # Residual [% of stroke] from which a warning is due, and its systematic share.
 REMAINS, FOLLOWS = 1.5, 0.6
 BINS = 16
@@ -73,7 +59,12 @@ def check_record(data: Dataset, *, searches_hysteresis: bool) -> None:
     """
     whole = data.full
     # Constant or too short records are refused by the core.
-    if len(data) < FEWEST or not searches_hysteresis or _steps(whole.u) or np.ptp(whole.u) == 0.0:
+    if (
+        len(data) < FEWEST
+        or not searches_hysteresis
+        or has_steps(whole.u)
+        or np.ptp(whole.u) == 0.0
+    ):
         return
     if not turns(whole.u) and not turns(whole.y):
         raise DataError(
@@ -81,43 +72,6 @@ def check_record(data: Dataset, *, searches_hysteresis: bool) -> None:
             f"{_drive(data, whole.u[-1])} and never back, where hysteresis does not show; record a "
             "drive that goes up and down, or hold the parameters of the hysteresis in parameters="
         )
-
-
-def record_warnings(data: Dataset) -> list[str]:
-    """Warnings about a record that do not depend on the model.
-
-    Parameters
-    ----------
-    data : Dataset
-        The record.
-
-    Returns
-    -------
-    list of str
-        Sentences, none for a sound record.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import piezotrack as pt
-    >>> u = 5.0 * np.sin(np.arange(5000) / 500.0)
-    >>> record_warnings(pt.Dataset(u=u, y=4e-6 * u, dt=0.005))
-    []
-    >>> print(record_warnings(pt.Dataset(u=u, y=4.0 * u, dt=0.005))[0])
-    a stroke of 40 m is not that of a nanopositioner: is the unit of the displacement right? It \
-would be 40 um if it is 1e6 too large, as um taken as m
-    """
-    data = data.measured
-    if np.ptp(data.u) == 0.0 or np.ptp(data.y) == 0.0:
-        return [*data.notes]
-    notes = [*data.notes, *data.far_notes]
-    whole = data.without_far_readings()
-    connection = unusual_connection(whole.u, whole.y)
-    if connection is not None:
-        notes.append(connection.note)
-        if not connection.follows:
-            return notes
-    return [*notes, *_units(whole), *_seldom(data), *_periods(whole), *_clipping(whole)]
 
 
 def fit_warnings(
@@ -148,7 +102,7 @@ def fit_warnings(
         One sentence, or none.
     """
     rest, u = data.y - x, data.u
-    if cost_percent <= REMAINS or rest.size < 10 * BINS or _steps(u):
+    if cost_percent <= REMAINS or rest.size < 10 * BINS or has_steps(u):
         return []
     rest = rest - rest.mean()
     # The residual as a function of drive and direction.
@@ -218,8 +172,8 @@ def amplitudes(u: Array) -> Array:
     return amplitude
 
 
-def _steps(u: Array) -> bool:
-    """Whether a drive has steps, or is constant between steps."""
+def has_steps(u: Array) -> bool:
+    """Return whether a drive has steps, or is constant between steps."""
     if u.size < 2:
         return False
     moves = np.abs(np.diff(u))
@@ -231,124 +185,6 @@ def jumps(u: Array) -> bool:
     return bool(float(np.abs(np.diff(u)).max()) >= JUMP * np.ptp(u))
 
 
-def _seldom(data: Dataset) -> list[str]:
-    """Warn of a sampling interval that only a wrong unit explains."""
-    if data.dt < SELDOM:
-        return []
-    return [
-        f"it is sampled every {data.dt:g} s: is the time in ms? It would be {1e3 / data.dt:g} Hz"
-    ]
-
-
-def _units(data: Dataset) -> list[str]:
-    """Warn of voltages, strokes and gains that only a wrong unit explains."""
-    if data.drive_unit != "V":
-        return []
-    most, swing, stroke = float(np.abs(data.u).max()), float(np.ptp(data.u)), data.stroke
-    gain = stroke / swing
-    if most > TOO_MANY_VOLTS:
-        return [
-            f"a drive of {most:.6g} V is not that of a piezo: is it in mV? It would be "
-            f"{most / 1e3:.4g} V"
-        ]
-    doubt = f"a stroke of {length_text(stroke)} is not that of a nanopositioner"
-    if stroke > LONGEST:
-        factor = min((1e3, 1e6, 1e9), key=lambda f: abs(math.log(stroke / f / USUAL)))
-        taken = {1e3: "um taken as mm", 1e6: "um taken as m", 1e9: "nm taken as m"}[factor]
-        return [
-            f"{doubt}: is the unit of the displacement right? It would be "
-            f"{length_text(stroke / factor)} if it is {_power(factor)} too large, as {taken}"
-        ]
-    if gain > HIGHEST_GAIN:
-        return [
-            f"{length_text(stroke)} under {swing:.3g} V are {1e6 * gain:.3g} um/V, more than piezo "
-            f"stages give: is the drive in V and taken as mV, 1e3 too small, or the displacement "
-            "1e3 too large?"
-        ]
-    least = LOWEST_GAIN_OF_COMMAND if swing <= COMMAND_VOLTS else LOWEST_GAIN
-    if gain < least or stroke < SHORTEST:
-        factor = min((1e3, 1e6), key=lambda f: abs(math.log(stroke * f / USUAL)))
-        taken = {1e3: "um taken as nm", 1e6: "um taken as pm"}[factor]
-        return [
-            f"{length_text(stroke)} under {swing:.4g} V are {1e9 * gain:.3g} nm/V, less than piezo "
-            f"stages give: is the unit of the displacement right? It would be "
-            f"{length_text(stroke * factor)} if it is {_power(factor)} too small, as {taken}"
-        ]
-    return []
-
-
-def _periods(data: Dataset) -> list[str]:
-    """Warn of a drive with less than one period."""
-    u = data.u
-    if _steps(u):
-        return []
-    turning = len(turns(u))
-    if turning == 0 and not turns(data.full.u):
-        if turns(data.y):
-            return []
-        return ["the drive never reverses: this record does not determine the hysteresis"]
-    open_end = abs(float(u[-1] - u[0])) > CLOSED * np.ptp(u)
-    if turning <= 1 and open_end:
-        return [
-            f"the window, {data.duration:.4g} s, is shorter than a period of the drive, which "
-            f"begins at {_drive(data, u[0])} and ends at {_drive(data, u[-1])}, within "
-            f"{_drive(data, u.min())} to {_drive(data, u.max())}: the loop is not closed, "
-            "and a fit to a part of it may not hold for the rest"
-        ]
-    return []
-
-
-def _clipping(data: Dataset) -> list[str]:
-    """Warn of a drive or a displacement that is clipped."""
-    u, y = data.u, data.y
-    warnings = []
-    swing, moves = float(np.ptp(u)), np.abs(np.diff(u))
-    quick = float(np.quantile(moves, 0.9))
-    still = moves <= 1e-4 * swing
-    # A drive that rests elsewhere too, as a staircase does, is not clipped.
-    rests = float(
-        np.mean(
-            still
-            & (np.abs(u[1:] - u.min()) > 0.005 * swing)
-            & (np.abs(u[1:] - u.max()) > 0.005 * swing)
-        )
-    )
-    for end, level in (("highest", float(u.max())), ("lowest", float(u.min()))):
-        held = [
-            (first, last)
-            for first, last in runs(np.abs(u - level) <= 0.005 * swing)
-            if last - first >= 5 and _cut_off(moves, first, last, quick, swing)
-        ]
-        share = sum(last - first for first, last in held) / u.size
-        if share >= CLIPPED and rests < 0.1 * share:
-            warnings.append(
-                f"the drive is cut off at {_drive(data, level)}, its {end}, for "
-                f"{100 * share:.0f} % of the window: was it clipped? A constant drive "
-                "does not determine the hysteresis"
-            )
-    for level in (float(y.max()), float(y.min())):
-        for first, last in runs(np.abs(y - level) <= 1e-3 * data.stroke):
-            part = u[first:last]
-            ends = part[[0, -1]]
-            further = max(float(part.max() - ends.max()), float(ends.min() - part.min()))
-            if last - first >= 10 and further > TURN * swing:
-                warnings.append(
-                    f"the displacement stays at {length_text(level)} while the drive goes "
-                    f"{_drive(data, further, 3)} further and back: is the sensor or the "
-                    "stage at its end?"
-                )
-                break
-    return warnings
-
-
-def _cut_off(moves: Array, first: int, last: int, quick: float, swing: float) -> bool:
-    """Whether a drive that is constant from `first` to `last` was moving before."""
-    if first < 4:
-        return False
-    into = moves[first - 4 : first]
-    return bool(into[:3].mean() >= 0.25 * quick and into.max() <= 0.1 * swing and last > first)
-
-
 def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the first sample, and that after the last, of each run of true entries."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
@@ -358,7 +194,3 @@ def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def _drive(data: Dataset, value: float, digits: int = 4) -> str:
     """Write a drive of a record with its unit."""
     return drive_text(value, data.drive_unit, digits)
-
-
-def _power(factor: float) -> str:
-    return f"1e{round(math.log10(factor))}"

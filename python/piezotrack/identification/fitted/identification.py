@@ -15,6 +15,7 @@ from ..._support.statistics import sample_noise
 from ...data.checks import diagnostics
 from ...data.checks.connections import unusual_connection
 from ...data.checks.hum import hum_lines, hum_notes, power_of
+from ...data.checks.record_flags import record_warnings
 from ..methods.descents import Descents
 from ..methods.particle_swarm import ParticleSwarm
 from .fitted_record import FittedRecord
@@ -234,7 +235,7 @@ class Identification(IdentifiedModel):
 
     def _notes_on(self, data: Dataset, record: FittedRecord, run: Response) -> list[str]:
         """Warnings about one of the records and the fit there."""
-        notes, rest, measured = diagnostics.record_warnings(data), data.y - run.x, data.measured
+        notes, rest, measured = record_warnings(data), data.y - run.x, data.measured
         rest = data.at_readings(rest)
         if measured.left_out is not None:
             rest[measured.left_out] = measured.counted(rest).mean()
