@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from ..control.controller.controller import Controller
+    from ..data.checks.record_flags import RecordFlag
     from .device import DeviceProcess
     from .parts import Light, Part
 
@@ -129,6 +130,10 @@ class Desk:
         The controller of the last search, and the one that the person accepted.
     tuned_for : object
         Settings that the last search was for.
+    live : bool
+        Whether a control is dragged.
+    flags : list of RecordFlag or None
+        What is unusual in the record, as it was last looked at.
     on_device : dict of str to object
         What was recorded, played and learnt on the device, by name.
     """
@@ -143,10 +148,14 @@ class Desk:
         self.jobs: dict[str, Job] = {}
         self.on_device: dict[str, Any] = {}
         self.device = device
+        self.live = False
+        self.flags: list[RecordFlag] | None = None
         self._changed = changed
         self._folder = Path(tempfile.mkdtemp(prefix="piezotrack-"))
         self._files: dict[Purpose, Path] = {}
         self._results: OrderedDict[str, tuple[Any, list[object]]] = OrderedDict()
+        self._once: dict[str, tuple[State, int, Any]] = {}
+        self._opened = [0]
         self._lock = threading.Lock()
 
     def changed(self, do: str = "refresh") -> None:
@@ -186,12 +195,14 @@ class Desk:
         place = self._folder / purpose
         shutil.rmtree(place, ignore_errors=True)
         place.mkdir()
+        self._opened[0] += 1
         (place / plain).write_bytes(content)
         self._files[purpose] = place / plain
         return plain
 
     def forget(self, purpose: Purpose) -> None:
         """Remove a file."""
+        self._opened[0] += 1
         shutil.rmtree(self._folder / purpose, ignore_errors=True)
         self._files.pop(purpose, None)
 
@@ -214,6 +225,28 @@ class Desk:
         shutil.rmtree(place, ignore_errors=True)
         place.mkdir()
         return place
+
+    def once(self, name: str, compute: Callable[[], Any]) -> Any:
+        """Return what follows from state and files alone, without a look at them while they stay.
+
+        Parameters
+        ----------
+        name : str
+            Which result.
+        compute : callable
+            Computes it.
+
+        Returns
+        -------
+        object
+            As `compute` returns it.
+        """
+        opened = self._opened[0]
+        known = self._once.get(name)
+        if known is None or known[0] is not self.state or known[1] != opened:
+            known = self.state, opened, compute()
+            self._once[name] = known
+        return known[2]
 
     def result(self, name: str, settings: Any, compute: Callable[[], Any]) -> Any:
         """Return a result, computed once for the same settings.

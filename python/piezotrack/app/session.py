@@ -97,6 +97,7 @@ class Session:
 
     def _answer(self, given: Mapping[str, Any]) -> None:
         """Do what a message says, and send the page."""
+        self.desk.live = bool(given.get("live"))
         error: Part | None = None
         download = None
         try:

@@ -99,7 +99,7 @@ function receive(answer) {
   $("running").textContent = answer.running ? `computing: ${answer.running}` : "";
   const fault = answer.error;
   if (answer.seq || fault) say(fault && !faultAt(main, fault.control, fault.text) ? fault.text : "");
-  history.replaceState(null, "", `#token=${token}&state=${answer.link}`);
+  keep(answer.link);
   if (begun.has(answer.seq)) {
     performance.measure("answer", { start: begun.get(answer.seq), end: performance.now() });
     begun.delete(answer.seq);
@@ -113,6 +113,13 @@ function receive(answer) {
       send(next);
     }
   }
+}
+
+// Browsers take a new address a few times a second only.
+let keeping;
+function keep(link) {
+  clearTimeout(keeping);
+  keeping = setTimeout(() => history.replaceState(null, "", `#token=${token}&state=${link}`), 200);
 }
 
 function rail(steps) {

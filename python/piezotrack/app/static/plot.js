@@ -9,7 +9,9 @@ const colour = (role) =>
   getComputedStyle(document.documentElement).getPropertyValue(`--${role}`).trim() || "#888";
 
 export function unpack(text) {
-  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  if (Uint8Array.fromBase64) return new Float64Array(Uint8Array.fromBase64(text).buffer);
+  const raw = atob(text), bytes = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i++) bytes[i] = raw.charCodeAt(i);
   return new Float64Array(bytes.buffer);
 }
 

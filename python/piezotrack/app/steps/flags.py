@@ -73,9 +73,14 @@ def _set(label: str, values: Mapping[str, Any]) -> Part:
 
 
 def flags_of(desk: Desk, part: Dataset) -> list[RecordFlag]:
-    """Return what is unusual in a part of the record, once for each."""
-    found = desk.result("record flags", [Same(part)], lambda: record_flags(part))
-    return list({flag.note: flag for flag in found}.values())
+    """Return what is unusual in a part of the record, once for each.
+
+    While the window is dragged these are the flags of the part before.
+    """
+    if not desk.live or desk.flags is None:
+        found = desk.result("record flags", [Same(part)], lambda: record_flags(part))
+        desk.flags = list({flag.note: flag for flag in found}.values())
+    return desk.flags
 
 
 def _mending(state: LogState, found: LogInfo, part: Dataset, flag: RecordFlag) -> list[Part]:
@@ -110,7 +115,7 @@ def flags(desk: Desk, found: LogInfo, log: Dataset, part: Dataset) -> Part:
         gaps = found.time.gaps
         words = f"{len(gaps)} gaps in the times, from {gaps[0][0]:.4g} to {gaps[0][1]:.4g} s first"
         items.append(parts.message("amber", words))
-    factor = spare_factor(log.u, log.dt)
+    factor = desk.result("spare", [Same(log)], lambda: spare_factor(log.u, log.dt))
     if factor > 1:
         lower = 1.0 / (log.dt * factor)
         words = f"{1.0 / log.dt:.4g} Hz are more than the drive needs"

@@ -92,8 +92,13 @@ def record_of(desk: Desk) -> Dataset:
 
 def window_of(desk: Desk) -> Dataset:
     """Return the part of the record that is used."""
-    log, window = record_of(desk), desk.state.log.window
-    return log if window is None else log[window[0] : window[1]]
+
+    def compute() -> Dataset:
+        log, window = record_of(desk), desk.state.log.window
+        return log if window is None else log[window[0] : window[1]]
+
+    found: Dataset = desk.once("window", compute)
+    return found
 
 
 class LogStep:

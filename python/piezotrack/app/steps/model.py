@@ -118,6 +118,11 @@ def test_of(desk: Desk) -> Dataset:
 
 def trials_of(desk: Desk) -> Trials:
     """Return the models of the present settings, fitted or not."""
+    found: Trials = desk.once("trials", lambda: _trials(desk))
+    return found
+
+
+def _trials(desk: Desk) -> Trials:
     state = replace(desk.state.model, chosen="")
     log = window_of(desk)
     test = stamp(desk.file("test", state.test)) if state.test else 0.0
