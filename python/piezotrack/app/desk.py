@@ -28,8 +28,8 @@ __all__ = ["Desk", "Download", "Job", "Purpose", "Same", "Step", "drawing"]
 
 # Pictures are drawn by one window at a time.
 drawing = threading.Lock()
-# Results that are kept, the last used ones.
-KEPT = 64
+# Results that are kept, the last used ones, and those that took long.
+KEPT, LASTING = 64, 100
 # What a file may be for.
 Purpose = Literal["log", "test", "motion"]
 
@@ -154,6 +154,7 @@ class Desk:
         self._folder = Path(tempfile.mkdtemp(prefix="piezotrack-"))
         self._files: dict[Purpose, Path] = {}
         self._results: OrderedDict[str, tuple[Any, list[object]]] = OrderedDict()
+        self._lasting: OrderedDict[str, tuple[Any, list[object]]] = OrderedDict()
         self._once: dict[str, tuple[State, int, Any]] = {}
         self._opened = [0]
         self._lock = threading.Lock()
@@ -248,7 +249,9 @@ class Desk:
             self._once[name] = known
         return known[2]
 
-    def result(self, name: str, settings: Any, compute: Callable[[], Any]) -> Any:
+    def result(
+        self, name: str, settings: Any, compute: Callable[[], Any], *, lasting: bool = False
+    ) -> Any:
         """Return a result, computed once for the same settings.
 
         Parameters
@@ -259,6 +262,8 @@ class Desk:
             What it depends on: dataclasses, numbers, texts, and objects as `Same`.
         compute : callable
             Computes it.
+        lasting : bool, optional
+            Whether it is kept beside the others, as what took long is.
 
         Returns
         -------
@@ -266,22 +271,27 @@ class Desk:
             As `compute` returns it.
         """
         key, kept = _key(name, settings)
+        results = self._lasting if lasting else self._results
         with self._lock:
-            if key in self._results:
-                self._results.move_to_end(key)
-                return self._results[key][0]
+            if key in results:
+                results.move_to_end(key)
+                return results[key][0]
         found = compute()
         with self._lock:
-            self._results[key] = found, kept
-            while len(self._results) > KEPT:
-                self._results.popitem(last=False)
+            results[key] = found, kept
+            while len(results) > (LASTING if lasting else KEPT):
+                results.popitem(last=False)
         return found
 
     def known(self, name: str, settings: Any) -> Any:
         """Return a result that was computed before; None where it was not."""
+        key, _ = _key(name, settings)
         with self._lock:
-            found = self._results.get(_key(name, settings)[0])
-        return None if found is None else found[0]
+            for results in (self._lasting, self._results):
+                if key in results:
+                    results.move_to_end(key)
+                    return results[key][0]
+        return None
 
     def start(self, name: str, work: Callable[[Job], None]) -> None:
         """Begin a long computation, in place of the last one of that name."""

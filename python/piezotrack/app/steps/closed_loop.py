@@ -254,6 +254,7 @@ def tuned_of(desk: Desk, *, full: bool) -> Tuned:
         "tuned" if full else "quick",
         _key(desk),
         lambda: tune([stage], [reference_of(desk)], search=search, **tuning_settings(desk)),
+        lasting=full,
     )
     return found
 

@@ -130,9 +130,8 @@ def _trials(desk: Desk) -> Trials:
     kinds = [one for one in MODELS if one.drive_unit in ("V", log.drive_unit)]
     kinds.sort(key=lambda one: order.get(one.name, len(order)))
     settings = [stamp(desk.file("log", desk.state.log.source)), desk.state.log, state, test]
-    found: Trials = desk.result(
-        "trials", settings, lambda: Trials({one.name: Trial(one) for one in kinds})
-    )
+    trials = Trials({one.name: Trial(one) for one in kinds})
+    found: Trials = desk.result("trials", settings, lambda: trials, lasting=True)
     return found
 
 
