@@ -105,8 +105,9 @@ crate-docs: ## The crates' pages: target/doc
 architecture: $(VENV)/installed ## Draw docs/architecture.svg from the code
 	$(BIN)/python docs/make_architecture.py
 
-pictures: $(VENV)/installed ## Draw the pictures of the pages that no example draws
+pictures: $(VENV)/installed $(VENV)/tools ## Draw the pictures of the pages that no example draws
 	$(BIN)/python docs/make_pictures.py
+	$(BIN)/python docs/make_page_pictures.py
 
 sentences: $(VENV)/pip ## All sentences that the program prints, to be read: target/sentences.txt
 	@mkdir -p target

@@ -214,3 +214,17 @@ def test_swapped_columns_are_exchanged_by_a_button(window: Window, tmp_path: Pat
     window.do(fix["do"], step=fix["step"], values=fix["values"])
     assert window.desk.state.log.drive == "voltage_V"
     assert window.desk.state.log.displacement == "displacement_m"
+
+
+@pytest.mark.parametrize(("width", "form"), [(85, "pdf"), (170, "svg"), (85, "png")])
+def test_every_chart_is_a_picture(window: Window, width: int, form: str) -> None:
+    window.do("log.example")
+    window.set("use", width=width, picture=form)
+    for name in ("drive", "y", "loop"):
+        answer, content = window.do("picture", chart=name)
+        assert answer["error"] is None
+        assert answer["download"] == f"{name}.{form}"
+        assert content is not None
+        assert content.startswith({"pdf": b"%PDF", "svg": b"<?xml", "png": b"\x89PNG"}[form])
+    refused = window.do("picture", chart="nothing")[0]["error"]
+    assert "one of drive, y, loop" in refused["text"]

@@ -69,7 +69,8 @@ def chart_figure(chart: Part, *, fig: Figure | None = None) -> Figure:
     import matplotlib.pyplot as plt
 
     if fig is None:
-        fig = plt.figure(figsize=look().size(*(WIDE if chart.get("wide") else HALF)))
+        size = look().size(*(WIDE if chart.get("wide") else HALF))
+        fig = plt.figure(figsize=size, layout="constrained")
     ax = fig.add_subplot()
     log = chart.get("log", "")
     ax.set_xscale("log" if "x" in log else "linear")
@@ -91,7 +92,7 @@ def chart_figure(chart: Part, *, fig: Figure | None = None) -> Figure:
     handles, names = ax.get_legend_handles_labels()
     known = dict(zip(names, handles, strict=True))
     if len(known) > 1:
-        ax.legend(known.values(), known.keys(), frameon=False)
+        fig.legend(known.values(), known.keys(), loc="outside upper left", ncols=3, frameon=False)
     return fig
 
 

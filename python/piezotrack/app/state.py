@@ -225,6 +225,8 @@ class DeviceState:
         Sampling rate of a record [Hz]; None for 1 kHz, or the nearest that the device has.
     trials : int
         Trials of learning, at most.
+    cutoff : float or None
+        Highest frequency that is learnt [Hz]; None for the highest that converges.
     zero : bool
         Whether readings count from where the device rests.
     """
@@ -235,6 +237,7 @@ class DeviceState:
     frequency: float = 1.0
     rate: float | None = None
     trials: int = 10
+    cutoff: float | None = None
     zero: bool = False
 
 

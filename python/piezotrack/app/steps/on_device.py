@@ -48,6 +48,7 @@ def running(desk: Desk) -> list[Part]:
         "Follow the motion on the device",
         parts.check("zero", "Count from where it rests", state.zero),
         parts.number("trials", "Trials of learning, at most", state.trials, whole=True),
+        parts.number("cutoff", "Learn up to", state.cutoff, "Hz", placeholder="what converges"),
         step="device",
     )
     still = not ready(desk)
@@ -106,6 +107,7 @@ def _learn(desk: Desk, _: Mapping[str, Any]) -> None:
         reference=reference_of(desk),
         model=_model(desk),
         trials=min(max(state.trials, 1), MOST_TRIALS),
+        cutoff=state.cutoff,
         zero=state.zero,
     )
     desk.on_device |= {"run": None, "errors": [], "learning": None}
@@ -136,6 +138,7 @@ def _learnt(
     reference: Reference,
     model: IdentifiedModel,
     trials: int,
+    cutoff: float | None,
     zero: bool,
 ) -> Learning:
     def progress(learner: IterativeLearning) -> None:
@@ -147,6 +150,7 @@ def _learnt(
         controller,
         model=model,
         trials=trials,
+        cutoff=cutoff,
         offset=read_zero(device) if zero else None,
         progress=progress,
     )
@@ -237,6 +241,7 @@ def _python(desk: Desk) -> list[str]:
             "table",
             model=model,
             trials=state.trials,
+            cutoff=state.cutoff,
             offset=offset,
         ),
         'learnt.save("learnt.csv")',
@@ -254,6 +259,7 @@ def _command(desk: Desk) -> str:
         device=facts_of(desk).address,
         limits=f"{plain(low)}:{plain(high)}V",
         trials=state.trials,
+        cutoff=None if state.cutoff is None else f"{plain(state.cutoff)}Hz",
         zero=state.zero,
     )
 
