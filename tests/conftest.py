@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import os
+
+# Each of the processes that run tests has a core: more threads would wait for each other. Before
+# NumPy is imported, and for the processes that tests start.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import signal
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +22,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 mpl.use("Agg")
+
+# Tests, and files of tests, that take more than three seconds of a core.
+LONG = Path(__file__).with_name("long_tests.txt")
 
 # Lines that commands print stay whole, whatever terminal the tests are started from.
 os.environ.pop("COLUMNS", None)
@@ -62,6 +70,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--soak-trace", default=None, help="folder for the calls under way")
     group.addoption("--soak-table", default=None, help="file for the table of tries and failures")
     group.addoption("--soak-loop", type=float, default=10.0, help="length of a loop on a device, s")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave to `make soak` what takes long, beside what is marked as slow in its file."""
+    long = set(LONG.read_text(encoding="utf-8").splitlines())
+    for item in items:
+        if {item.nodeid, item.nodeid.partition("::")[0]} & long:
+            item.add_marker(pytest.mark.slow)
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -149,3 +149,13 @@ def test_a_compared_law_keeps_the_phase_margin() -> None:
             assert case.phase_margin >= phase
         crossovers.append(report.high.crossover or math.inf)
     assert crossovers[1] < crossovers[0]
+
+
+def test_the_phase_at_the_crossover_is_the_margin() -> None:
+    law = mixed_sensitivity(STAGE, dt=2e-4, limits=LIMITS, bandwidth=40.0)
+    report = pt.check_loop(STAGE, pt.Controller(dt=2e-4, limits=LIMITS, feedback=law))
+    response = report.response(4000)
+    crossing = int(np.flatnonzero(np.abs(response.open_loop) > 1.0)[-1])
+    margin = report.middle.phase_margin
+    assert margin is not None
+    assert response.phase[crossing] == pytest.approx(margin - math.pi, abs=0.02)

@@ -332,7 +332,7 @@ def _spectrum_chart(desk: Desk, run: Tracking, before: Tracking | None) -> Part:
 
 def _bode(desk: Desk, report: LoopReport, before: LoopReport | None) -> list[Part]:
     """Draw the open loop at the lowest, the middle and the highest gain."""
-    sizes, planes = [], []
+    sizes, phases, planes = [], [], []
     for name, one in report.cases:
         stable = _case(desk, one)[0]
         role = "unstable" if not stable else {"middle": "plant"}.get(name, "noise")
@@ -340,6 +340,8 @@ def _bode(desk: Desk, report: LoopReport, before: LoopReport | None) -> list[Par
         shown = f"{name} gain" + ("" if stable else ", unstable")
         size = np.maximum(np.abs(curves.open_loop), 1e-12)
         sizes.append(parts.points(curves.frequency, size, shown, role, wide=name == "middle"))
+        degrees = np.degrees(curves.phase)
+        phases.append(parts.points(curves.frequency, degrees, shown, role, wide=name == "middle"))
         planes.append(parts.points(*_plane(curves.open_loop), shown, role, wide=name == "middle"))
     sensitivity = report.response(POINTS)
     sizes.append(
@@ -349,6 +351,8 @@ def _bode(desk: Desk, report: LoopReport, before: LoopReport | None) -> list[Par
         old = before.response(POINTS)
         size = np.maximum(np.abs(old.open_loop), 1e-12)
         sizes.append(parts.points(old.frequency, size, "accepted", "accepted", dash=True))
+        degrees = np.degrees(old.phase)
+        phases.append(parts.points(old.frequency, degrees, "accepted", "accepted", dash=True))
         planes.append(parts.points(*_plane(old.open_loop), "accepted", "accepted", dash=True))
     planes.append(parts.points([-1.0], [0.0], "critical point", "bad", marks=True))
     middle = report.middle
@@ -369,6 +373,16 @@ def _bode(desk: Desk, report: LoopReport, before: LoopReport | None) -> list[Par
             sizes,
             log="xy",
             levels=[{"at": 0.0, "label": "1"}],
+        ),
+        parts.chart(
+            "l-phase",
+            "Phase of the open loop",
+            words,
+            ("frequency", "Hz"),
+            ("phase", "deg"),
+            phases,
+            log="x",
+            levels=[{"at": -180.0, "label": "-180 deg"}],
         ),
         parts.chart(
             "l-nyquist",

@@ -176,6 +176,11 @@ class LoopResponse:
     complementary: NDArray[np.complex128]
     learning: Array
 
+    @property
+    def phase(self) -> Array:
+        """Phase of the open loop without jumps of a turn [rad], shape (n,)."""
+        return np.unwrap(np.angle(self.open_loop))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoopReport(Result):
