@@ -31,14 +31,14 @@ PATIENCE, LEAVE, PACE = 60.0, 5.0, 0.02
 
 
 class Work(Protocol[T_co]):
-    """What is done with a device: a function that can be pickled; it may tell how it goes on."""
+    """A function that does something with a device; it can be pickled, and may tell how it goes."""
 
     def __call__(self, device: Device, tell: Tell, /) -> T_co: ...
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What a device says of itself.
+    """Limits, rates and names of a device, as it says them.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ def _attend(address: str, pipe: Connection) -> None:
 
 
 class _Attendant:
-    """What the process does: one work after the other, each of which can be interrupted."""
+    """The work of the process: one order after the other, each of which can be interrupted."""
 
     def __init__(self, device: Device, pipe: Connection) -> None:
         self.device, self.pipe = device, pipe

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._support.display.look import drawing, figure_style, look
+from .._support.display.look import figure_style, look
 from .._support.files.writing import save_figures
 from .._support.messages import quoted
 from ..errors import ParameterError
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .desk import Desk
     from .parts import Part
 
-__all__ = ["chart_figure", "picture"]
+__all__ = ["picture"]
 
 # Pixels from side to side to which lines are thinned: 170 mm at 300 dots per inch.
 PIXELS = 2000
@@ -50,49 +50,38 @@ COLOURS = {
 }
 
 
-@drawing
-def chart_figure(chart: Part, *, fig: Figure | None = None) -> Figure:
-    """Draw a chart of the page.
-
-    Parameters
-    ----------
-    chart : Part
-        As of `parts.chart`.
-    fig : Figure, optional
-        A figure to draw in.
-
-    Returns
-    -------
-    Figure
-        With its axes, units and legend; the sentence is left to the caption.
-    """
+def _figure(chart: Part) -> Figure:
+    """Draw a chart with its axes, units and legend; the sentence is left to the caption."""
+    import matplotlib as mpl
     import matplotlib.pyplot as plt
 
-    if fig is None:
+    with mpl.rc_context(look().settings):
         size = look().size(*(WIDE if chart.get("wide") else HALF))
         fig = plt.figure(figsize=size, layout="constrained")
-    ax = fig.add_subplot()
-    log = chart.get("log", "")
-    ax.set_xscale("log" if "x" in log else "linear")
-    ax.set_yscale("log" if "y" in log else "linear")
-    for line in chart["lines"]:
-        _line(ax, line)
-    for level in chart.get("levels", ()):
-        on_y = level.get("axis", "y") == "y"
-        at = 10.0 ** level["at"] if ("y" if on_y else "x") in log else level["at"]
-        (ax.axhline if on_y else ax.axvline)(at, color=COLOURS["noise"], ls=":", lw=0.8)
-    if view := chart.get("view"):
-        ax.set(xlim=view[:2], ylim=view[2:])
-    span = ax.get_xlim(), ax.get_ylim()
-    for one in chart.get("regions", ()):
-        over = ax.axhspan if one["axis"] == "y" else ax.axvspan
-        hatch = "//" if one["hatched"] else None
-        over(one["from"], one["to"], color=COLOURS[one["role"]], alpha=0.16, lw=0, hatch=hatch)
-    ax.set(xlim=span[0], ylim=span[1], xlabel=_named(chart["x"]), ylabel=_named(chart["y"]))
-    handles, names = ax.get_legend_handles_labels()
-    known = dict(zip(names, handles, strict=True))
-    if len(known) > 1:
-        fig.legend(known.values(), known.keys(), loc="outside upper left", ncols=3, frameon=False)
+        ax = fig.add_subplot()
+        log = chart.get("log", "")
+        ax.set_xscale("log" if "x" in log else "linear")
+        ax.set_yscale("log" if "y" in log else "linear")
+        for line in chart["lines"]:
+            _line(ax, line)
+        for level in chart.get("levels", ()):
+            on_y = level.get("axis", "y") == "y"
+            at = 10.0 ** level["at"] if ("y" if on_y else "x") in log else level["at"]
+            (ax.axhline if on_y else ax.axvline)(at, color=COLOURS["noise"], ls=":", lw=0.8)
+        if view := chart.get("view"):
+            ax.set(xlim=view[:2], ylim=view[2:])
+        span = ax.get_xlim(), ax.get_ylim()
+        for one in chart.get("regions", ()):
+            over = ax.axhspan if one["axis"] == "y" else ax.axvspan
+            hatch = "//" if one["hatched"] else None
+            over(one["from"], one["to"], color=COLOURS[one["role"]], alpha=0.16, lw=0, hatch=hatch)
+        ax.set(xlim=span[0], ylim=span[1], xlabel=_named(chart["x"]), ylabel=_named(chart["y"]))
+        handles, names = ax.get_legend_handles_labels()
+        known = dict(zip(names, handles, strict=True))
+        if len(known) > 1:
+            fig.legend(
+                known.values(), known.keys(), loc="outside upper left", ncols=3, frameon=False
+            )
     return fig
 
 
@@ -153,5 +142,5 @@ def picture(desk: Desk, page: Callable[[Desk], list[Part]], name: str) -> Downlo
     if name in zoom:
         chart = {**chart, "view": zoom[name]}
     with one_by_one, figure_style("paper", width=f"{use.width}mm", formats=[use.picture]):
-        (path,) = save_figures({name: chart_figure(chart)}, desk.place("picture"))
+        (path,) = save_figures({name: _figure(chart)}, desk.place("picture"))
     return Download(path.name, path.read_bytes())
