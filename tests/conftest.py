@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 mpl.use("Agg")
 
-# Tests, and files of tests, that take more than three seconds of a core.
+# Tests, and files of tests, that take more than a second and a half of a core.
 LONG = Path(__file__).with_name("long_tests.txt")
 
 # Lines that commands print stay whole, whatever terminal the tests are started from.
