@@ -17,7 +17,7 @@ from .parts import Plotter, message, messages
 from .state import State
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from ..control.controller.controller import Controller
     from ..data.checks.record_flags import RecordFlag
@@ -42,8 +42,8 @@ class Step(Protocol):
     def light(self, desk: Desk) -> tuple[Light, str]:
         """Return how far the step is, and that in a sentence."""
 
-    def page(self, desk: Desk) -> list[Part]:
-        """Return what is shown."""
+    def page(self, desk: Desk) -> Iterable[Part]:
+        """Return what is shown; what comes before an error is shown with it."""
 
     def python(self, desk: Desk) -> list[str]:
         """Return the lines of Python that do the same; empty as long as there is nothing."""
@@ -216,6 +216,8 @@ class Desk:
             It is not there: the state was made with it, and it has to be opened again.
         """
         found = self._files.get(purpose)
+        if not name:
+            raise DataError("there is no file yet: drop one here")
         if found is None or found.name != name:
             raise DataError(f"{name} is not open: drop it here again")
         return found

@@ -16,7 +16,7 @@ from .desk import drawing as one_by_one
 from .parts import Plotter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -110,7 +110,7 @@ def _named(axis: Part) -> str:
     return f"{label} [{axis['unit']}]" if axis["unit"] else label
 
 
-def picture(desk: Desk, page: Callable[[Desk], list[Part]], name: str) -> Download:
+def picture(desk: Desk, page: Callable[[Desk], Iterable[Part]], name: str) -> Download:
     """Draw a chart of a page, as it is zoomed, at the width of a column or of a page of a journal.
 
     Parameters

@@ -209,12 +209,14 @@ class Session:
         """Return the page: the parts that differ from what the window has."""
         desk = self.desk
         step = desk.state.step
+        parts: list[Part] = []
         try:
-            parts = PAGES[step].page(desk)
+            for part in PAGES[step].page(desk):
+                parts.append(part)
         except PiezotrackError as problem:
-            parts = [messages("fault", message("red", str(problem)))]
+            parts.append(messages("fault", message("red", str(problem))))
         except Exception as problem:
-            parts = [messages("fault", message("red", _own_fault(problem)))]
+            parts.append(messages("fault", message("red", _own_fault(problem))))
         rail = []
         for name in STEPS:
             light, sentence = _light(desk, name)

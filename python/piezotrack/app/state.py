@@ -35,6 +35,21 @@ PARTS = (*STEPS, "device")
 # Characters of a text and entries of a list, at most.
 LONGEST, MOST = 2000, 200
 
+# Settings that are above 0, and those that are not below it.
+ABOVE = {
+    "dt",
+    "resample",
+    "decimate",
+    "frequency",
+    "steps",
+    "band",
+    "kp",
+    "rate",
+    "trials",
+    "cutoff",
+}
+NOT_BELOW = {"seed", "ki", "kd", "low_pass", "notch", "delay", "noise", "spread"}
+
 Span = tuple[float, float]
 
 
@@ -369,7 +384,7 @@ def checked(kind: type[Any], values: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     ParameterError
-        A name is not among them, or a value is not of its type.
+        A name is not among them, or a value is not of its type or in its range.
     """
     hints = get_type_hints(kind)
     names = [one.name for one in fields(kind) if not is_dataclass(hints[one.name])]
@@ -377,8 +392,17 @@ def checked(kind: type[Any], values: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in values.items():
         if name not in names:
             raise ParameterError("setting", quoted(name), f"one of {', '.join(names)}")
-        taken[name] = _of_type(name, value, hints[name])
+        taken[name] = _in_range(name, _of_type(name, value, hints[name]))
     return taken
+
+
+def _in_range(name: str, value: Any) -> Any:
+    """Return a number of a setting that has to be above 0, or not below it."""
+    if value is not None and name in ABOVE and value <= 0:
+        raise ParameterError(name, f"{value:g}", "a number above 0")
+    if value is not None and name in NOT_BELOW and value < 0:
+        raise ParameterError(name, f"{value:g}", "0 or a number above it")
+    return value
 
 
 def _of_type(name: str, value: Any, hint: Any) -> Any:

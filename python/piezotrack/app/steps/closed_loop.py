@@ -348,7 +348,7 @@ def with_hand(desk: Desk, base: Controller) -> Controller:
         kp=kp,
         ti=kp / ki if ki > 0.0 else math.inf,
         td=kd / kp if kp > 0.0 else 0.0,
-        tt=None if law is None else law.tt,
+        tt=None if law is None or ki == 0.0 else law.tt,
     )
     repetitive = base.repetitive
     if state.repetitive and repetitive is None and (period := reference_of(desk).period):

@@ -29,6 +29,7 @@ __all__ = [
     "begin",
     "facts_of",
     "first",
+    "limits_fault",
     "limits_of_device",
     "need_stroke",
     "ready",
@@ -51,6 +52,8 @@ def recording(desk: Desk) -> list[Part]:
     """Return the part of the page that records a log."""
     if desk.device is None:
         return []
+    if limits_fault(desk):
+        return first(desk, "log")
     state = desk.state.device
     drive = parts.controls(
         "recording",
@@ -75,19 +78,20 @@ def recording(desk: Desk) -> list[Part]:
 
 def first(desk: Desk, step: str) -> list[Part]:
     """Return the limits, and the slow stroke that comes before everything else."""
-    facts, (low, high) = facts_of(desk), limits_of_device(desk)
-    state = desk.state.device
+    facts, state = facts_of(desk), desk.state.device
+    lowest, highest = facts.limits
     span = f"{facts.limits[0]:g} to {facts.limits[1]:g} V"
     title = f"Device: {' to '.join(facts.channels)}, {span}"
     limits = parts.controls(
         "limits",
         title,
-        parts.number("low", "Lowest voltage", facts.limits[0] if state.low is None else low, "V"),
-        parts.number(
-            "high", "Highest voltage", facts.limits[1] if state.high is None else high, "V"
-        ),
+        parts.number("low", "Lowest voltage", lowest if state.low is None else state.low, "V"),
+        parts.number("high", "Highest voltage", highest if state.high is None else state.high, "V"),
         step="device",
     )
+    if fault := limits_fault(desk):
+        return [limits, parts.messages("limits-fault", parts.message("red", fault))]
+    low, high = limits_of_device(desk)
     stroked = _stroked(desk)
     busy = desk.device is not None and desk.device.busy
     limits["buttons"] = [
@@ -127,6 +131,15 @@ def limits_of_device(desk: Desk) -> tuple[float, float]:
         expected = f"voltages that increase, within {lowest:g} to {highest:g} V of the device"
         raise ParameterError(name, f"{value:g} V", expected)
     return low, high
+
+
+def limits_fault(desk: Desk) -> str:
+    """Say why the limits that are set cannot be used; empty where they can."""
+    try:
+        limits_of_device(desk)
+    except ParameterError as error:
+        return str(error)
+    return ""
 
 
 def _rate(desk: Desk, usual: float) -> float:

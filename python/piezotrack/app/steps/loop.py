@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._support.units import best_length_unit, decibels, length_text
+from ...errors import PiezotrackError
 from .. import parts
 from ..code import Code, call, command, plain
 from .closed_loop import (
@@ -28,7 +29,7 @@ from .model import chosen_trial
 from .motion import motion_line, motion_word
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from ...control.controller.controller import Controller
     from ...control.loop.stability import LoopReport
@@ -66,29 +67,36 @@ class LoopStep:
         words = f"{length_text(rms, 3)} rms, Ms {worst:.2g}"
         return ("amber" if worst > FRAGILE * 1.005 else "green"), words
 
-    def page(self, desk: Desk) -> list[Part]:
+    def page(self, desk: Desk) -> Iterator[Part]:
         """Return sliders, error, spectrum, Bode and Nyquist, and the margins."""
         if not desk.state.log.source or chosen_trial(desk) is None:
-            return [parts.needs("model", "Fit a model first.")]
+            yield parts.needs("model", "Fit a model first.")
+            return
+        yield _sliders(desk)
         if known_tuning(desk) is None and not by_hand(desk) and desk.tuned_for != _settings(desk):
             _tune(desk, {})
-        controller = controller_of(desk)
-        run, report = run_of(desk, controller), report_of(desk, controller)
+        try:
+            controller = controller_of(desk)
+            run, report = run_of(desk, controller), report_of(desk, controller)
+        except PiezotrackError:
+            # What was typed can be typed again.
+            if desk.last_tuned is not None:
+                yield _gains(desk, desk.last_tuned)
+            yield _setting(desk)
+            raise
         old = desk.accepted if desk.accepted is not controller else None
         before = None if old is None else run_of(desk, old)
-        return [
-            _sliders(desk),
-            *desk.faults("tuning"),
-            _words(desk, report),
-            _gains(desk, controller),
-            _setting(desk),
-            _error_chart(desk, run, before),
-            _spectrum_chart(desk, run, before),
-            *_bode(desk, report, None if old is None else report_of(desk, old)),
-            _margins(desk, report),
-            parts.code("code", "The same in Python", "\n".join(self.python(desk))),
-            parts.code("command", "and as a command", "\n".join(self.commands(desk))),
-        ]
+        if known_tuning(desk) is None:
+            yield from desk.faults("tuning")
+        yield _words(desk, report)
+        yield _gains(desk, controller)
+        yield _setting(desk)
+        yield _error_chart(desk, run, before)
+        yield _spectrum_chart(desk, run, before)
+        yield from _bode(desk, report, None if old is None else report_of(desk, old))
+        yield _margins(desk, report)
+        yield parts.code("code", "The same in Python", "\n".join(self.python(desk)))
+        yield parts.code("command", "and as a command", "\n".join(self.commands(desk)))
 
     def python(self, desk: Desk) -> list[str]:
         """Tune, or make the controller that was set by hand."""

@@ -23,7 +23,7 @@ from ..desk import Same
 from .log import log_options, record_of, stamp, window_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from ...data.dataset import Dataset
     from ...identification.fitted.certainty.prediction_band import PredictionBand
@@ -174,24 +174,25 @@ class ModelStep:
         light: Light = "green" if share < GOOD else "amber" if share < POOR else "red"
         return light, f"{trial.info.title}, {100.0 * share:.2g} % of stroke"
 
-    def page(self, desk: Desk) -> list[Part]:
+    def page(self, desk: Desk) -> Iterator[Part]:
         """Return the cards, and loop, error and residual of the chosen model."""
         if not desk.state.log.source:
-            return [parts.needs("log", "Open a log first.")]
+            yield parts.needs("log", "Open a log first.")
+            return
+        yield _split(desk)
         trials = trials_of(desk)
         if not trials.begun:
             _begin(desk, {})
-        page = [_split(desk), *desk.faults("models"), _cards(desk, trials)]
+        yield from desk.faults("models")
+        yield _cards(desk, trials)
         if (course := _convergence(desk, trials)) is not None:
-            page.append(course)
+            yield course
         trial = chosen_trial(desk)
         if trial is not None and trial.fit is not None:
-            page += [*_of_model(desk, trial), *desk.faults("certainty")]
-            page += [
-                parts.code("code", "The same in Python", "\n".join(self.python(desk))),
-                parts.code("command", "and as a command", "\n".join(self.commands(desk))),
-            ]
-        return page
+            yield from _of_model(desk, trial)
+            yield from desk.faults("certainty")
+            yield parts.code("code", "The same in Python", "\n".join(self.python(desk)))
+            yield parts.code("command", "and as a command", "\n".join(self.commands(desk)))
 
     def python(self, desk: Desk) -> list[str]:
         """Fit the chosen model and judge it."""
@@ -261,12 +262,8 @@ def _arguments(desk: Desk) -> dict[str, Any]:
 def _split(desk: Desk) -> Part:
     """Return what is fitted and what is the test, and the drawer with the rest."""
     state = desk.state.model
-    train, test, same = parts_of(desk)
-    fitted = f"{train.t[0]:.4g} to {_end(train):.4g} s"
-    tested = f"{test.t[0]:.4g} to {_end(test):.4g} s"
-    where = "of the same log" if same else f"of {state.test}"
     items = []
-    if same:
+    if not state.test:
         items.append(
             parts.slider("share", "Fitted share of the window", state.share, (LEAST, MOST))
         )
@@ -283,8 +280,19 @@ def _split(desk: Desk) -> Part:
         parts.check("delay", "Fit a delay", state.delay),
         parts.number("seed", "Seed", state.seed, whole=True),
     ]
-    title = f"Fitted: {fitted}. Test: {tested} {where}, which is not fitted."
-    return parts.controls("split", title, *items, step="model")
+    return parts.controls("split", _split_words(desk), *items, step="model")
+
+
+def _split_words(desk: Desk) -> str:
+    """Say what is fitted and what is the test, where both are there."""
+    try:
+        train, test, same = parts_of(desk)
+    except PiezotrackError:
+        return "Fit and test"
+    fitted = f"{train.t[0]:.4g} to {_end(train):.4g} s"
+    tested = f"{test.t[0]:.4g} to {_end(test):.4g} s"
+    where = "of the same log" if same else f"of {desk.state.model.test}"
+    return f"Fitted: {fitted}. Test: {tested} {where}, which is not fitted."
 
 
 def _cards(desk: Desk, trials: Trials) -> Part:

@@ -27,7 +27,7 @@ from .closed_loop import (
 from .model import chosen_trial
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from ...control.controller.controller import Controller
     from ...control.loop.tracking import Tracking
@@ -67,21 +67,20 @@ class MotionStep:
         words = f"{motion.name}, {length_text(motion.high - motion.low, 3)}"
         return ("amber" if beyond else "green"), words
 
-    def page(self, desk: Desk) -> list[Part]:
+    def page(self, desk: Desk) -> Iterator[Part]:
         """Return the controls of the motion, and what three controllers make of it."""
         if not desk.state.log.source or chosen_trial(desk) is None:
-            return [parts.needs("model", "Fit a model first.")]
+            yield parts.needs("model", "Fit a model first.")
+            return
+        yield _controls(desk)
         runs = {name: run_of(desk, one) for name, one in controllers(desk).items()}
-        return [
-            _controls(desk),
-            *_warnings(desk, runs["inverse"]),
-            _motion_chart(desk, runs),
-            _error_chart(desk, runs),
-            _voltage_chart(desk, runs["inverse"]),
-            _table(desk, runs),
-            parts.code("code", "The same in Python", "\n".join(self.python(desk))),
-            parts.code("command", "and as a command", "\n".join(self.commands(desk))),
-        ]
+        yield from _warnings(desk, runs["inverse"])
+        yield _motion_chart(desk, runs)
+        yield _error_chart(desk, runs)
+        yield _voltage_chart(desk, runs["inverse"])
+        yield _table(desk, runs)
+        yield parts.code("code", "The same in Python", "\n".join(self.python(desk)))
+        yield parts.code("command", "and as a command", "\n".join(self.commands(desk)))
 
     def python(self, desk: Desk) -> list[str]:
         """Make the motion and the inverse for it, and simulate both."""

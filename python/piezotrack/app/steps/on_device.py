@@ -17,7 +17,16 @@ from .. import parts
 from ..code import Code, call, command, plain
 from ..desk import Download, drawing
 from .closed_loop import model_of, reference_of
-from .device import begin, facts_of, first, limits_of_device, need_stroke, ready, stroke
+from .device import (
+    begin,
+    facts_of,
+    first,
+    limits_fault,
+    limits_of_device,
+    need_stroke,
+    ready,
+    stroke,
+)
 from .motion import motion_line, motion_word
 
 if TYPE_CHECKING:
@@ -35,13 +44,13 @@ if TYPE_CHECKING:
 
 __all__ = ["RUNNING", "running"]
 
-MOST_TRIALS = 100
-
 
 def running(desk: Desk) -> list[Part]:
     """Return the part of the page that plays and learns the motion."""
     if desk.device is None:
         return []
+    if limits_fault(desk):
+        return first(desk, "use")
     state = desk.state.device
     settings = parts.controls(
         "run",
@@ -106,7 +115,7 @@ def _learn(desk: Desk, _: Mapping[str, Any]) -> None:
         controller=_controller(desk),
         reference=reference_of(desk),
         model=_model(desk),
-        trials=min(max(state.trials, 1), MOST_TRIALS),
+        trials=state.trials,
         cutoff=state.cutoff,
         zero=state.zero,
     )

@@ -32,7 +32,7 @@ from .motion import motion_word
 from .on_device import RUNNING, running
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
     from ..desk import Desk
@@ -63,12 +63,15 @@ class UseStep:
             return "amber", "model only, loop not tuned"
         return "green", "model and controller"
 
-    def page(self, desk: Desk) -> list[Part]:
+    def page(self, desk: Desk) -> Iterator[Part]:
         """Return the files, the pictures, and the script and the commands of all steps."""
         if not desk.state.log.source or chosen_trial(desk) is None:
-            return [parts.needs("model", "Fit a model first.")]
+            yield parts.needs("model", "Fit a model first.")
+            return
         use = desk.state.use
         tuning = "tuning" in desk.running
+        if tuning:
+            yield parts.messages("wait", parts.message("grey", WAIT))
         form = parts.controls(
             "form",
             "Controller for firmware and other programs",
@@ -78,31 +81,28 @@ class UseStep:
             step="use",
         )
         form["buttons"] = [parts.action("Export", "use.export", primary=True, disabled=tuning)]
-        pictures = parts.controls(
+        yield form
+        yield parts.buttons(
+            "files",
+            parts.action("Controller", "use.controller", disabled=tuning),
+            parts.action("Model", "use.model"),
+            parts.action("Voltage as a table", "use.table"),
+            parts.action("Motion", "motion.csv"),
+            parts.action("Report", "use.report"),
+            parts.action("Script", "use.script"),
+            parts.action("State of this page", "use.state"),
+        )
+        yield from running(desk)
+        yield parts.controls(
             "pictures",
             "Pictures: each chart of the page has a button for its file",
             parts.select("width", "Width", use.width, [(85, "85 mm"), (170, "170 mm")]),
             parts.select("picture", "Format", use.picture, [(f, f) for f in ("pdf", "svg", "png")]),
             step="use",
         )
-        return [
-            *([parts.messages("wait", parts.message("grey", WAIT))] if tuning else []),
-            form,
-            parts.buttons(
-                "files",
-                parts.action("Controller", "use.controller", disabled=tuning),
-                parts.action("Model", "use.model"),
-                parts.action("Voltage as a table", "use.table"),
-                parts.action("Motion", "motion.csv"),
-                parts.action("Report", "use.report"),
-                parts.action("Script", "use.script"),
-                parts.action("State of this page", "use.state"),
-            ),
-            *running(desk),
-            pictures,
-            parts.code("script", "All steps in Python", "\n".join(self.python(desk)), open=True),
-            parts.code("commands", "and as commands", "\n".join(self.commands(desk)), open=True),
-        ]
+        script, lines = "\n".join(self.python(desk)), "\n".join(self.commands(desk))
+        yield parts.code("script", "All steps in Python", script, open=True)
+        yield parts.code("commands", "and as commands", lines, open=True)
 
     def python(self, desk: Desk) -> list[str]:
         """Return the script of all steps."""
