@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from .._support.messages import quoted
 from ..errors import ParameterError, PiezotrackError
 from .desk import Desk, Download
-from .parts import Plotter, message, messages
+from .parts import Plotter, action, buttons, message, messages
 from .pictures import picture
 from .state import STEPS, State
 from .steps import PAGES
@@ -222,6 +222,10 @@ class Session:
             light, sentence = _light(desk, name)
             title = PAGES[name].title
             rail.append({"step": name, "title": title, "light": light, "text": sentence})
+            if rail[-2:-1] and rail[-2]["step"] == step and rail[-2]["light"] in ("green", "amber"):
+                parts.append(
+                    buttons("onward", action(f"Next: {title}", "go", to=name, primary=True))
+                )
         named = {f"{step}.{part['id']}": part for part in parts}
         changed = {key: part for key, part in named.items() if self._sent.get(key) != part}
         self._sent = named
