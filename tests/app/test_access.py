@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from page_server import WINDOW, Served, Socket
+from page.server import WINDOW, Served, Socket
 from piezotrack.app import server
 from piezotrack.app.desk import Desk
 from piezotrack.errors import PiezotrackError

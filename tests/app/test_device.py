@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from page_server import Served
-from page_window import Window
+from page.server import Served
+from page.window import Window
 from piezotrack.app.device import DeviceProcess
 from piezotrack.app.steps import model
 from piezotrack.stages.registry import MODELS

@@ -14,7 +14,7 @@ import pytest
 
 import piezotrack as pt
 from commands import ran
-from page_window import Window
+from page.window import Window
 from piezotrack.app.steps import PAGES, model
 from piezotrack.app.steps.closed_loop import controller_of, range_of, reach_of, run_of
 from piezotrack.app.steps.motion import controllers

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from page_window import Window
+from page.window import Window
 from piezotrack.app.device import DeviceProcess
 from piezotrack.app.steps import model
 from piezotrack.stages.registry import MODELS
