@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from page.interrupted import interruptions
 from page.server import Served
 from page.window import Window
 from piezotrack.app.device import DeviceProcess
@@ -88,6 +90,18 @@ def test_from_a_record_to_a_learnt_table(
     window.session.close()
 
 
+def test_the_first_stroke_is_slow_from_rest_on(device: DeviceProcess) -> None:
+    window = Window(device)
+    window.set("device", low=30.0, high=60.0)
+    window.do("log.stroke")
+    window.finish()
+    whole = window.desk.on_device["stroke"].full
+    assert whole.u[0] == 0.0
+    # 30 V in 2.5 s, smoothly; half a second would take 112 V/s.
+    assert np.abs(np.diff(whole.u)).max() / whole.dt < 25.0
+    window.session.close()
+
+
 @pytest.mark.parametrize(
     ("values", "named"), [({"low": -1.0}, "low"), ({"high": 75.1}, "high"), ({"low": 70.0}, "high")]
 )
@@ -125,6 +139,23 @@ def moving(window: Window, address: str) -> Any:
     window.do("log.stroke")
     reached(other, lambda volts: volts > 10.0, within=10.0)
     return other
+
+
+def test_the_way_to_rest_is_not_hurried() -> None:
+    """A second interruption would end the way to rest in one step."""
+    device = DeviceProcess("virtual:")
+    told: list[object] = []
+
+    def again() -> bool:
+        device.stop()
+        return bool(told)
+
+    assert device.run(interruptions, told.append, again) == 1
+    assert device.run(interruptions, told.append, again) == 1
+    if hasattr(os, "getpgid"):
+        # Ctrl-C in a terminal goes to the group of the program.
+        assert os.getpgid(device._process.pid or 0) != os.getpgid(0)
+    device.close()
 
 
 def test_stop_leads_to_rest(slow: pt.hardware.GcsServer) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from contextlib import closing, suppress
@@ -21,13 +22,15 @@ if TYPE_CHECKING:
 
     Tell = Callable[[object], None]
 
-__all__ = ["DeviceProcess", "Facts"]
+__all__ = ["IN_USE", "DeviceProcess", "Facts"]
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 # Longest wait for a connection, and for the way to rest at the end [s]; time between two looks at
 # what the process reports.
 PATIENCE, LEAVE, PACE = 60.0, 5.0, 0.02
+IN_USE = "the device is in use: wait until it is at rest, or press STOP"
+ENDED = "the process that keeps the device has ended: start piezotrack app again"
 
 
 class Work(Protocol[T_co]):
@@ -137,7 +140,7 @@ class DeviceProcess:
             As of `work`.
         """
         if not self._using.acquire(blocking=False):
-            raise DeviceError("the device is in use: wait until it is at rest, or press STOP")
+            raise DeviceError(IN_USE)
         try:
             self._send(("run", work))
             while True:
@@ -181,13 +184,12 @@ class DeviceProcess:
         return kind, found
 
 
-ENDED = "the process that keeps the device has ended: start piezotrack app again"
-
-
 def _attend(address: str, pipe: Connection) -> None:
     """Connect to a device, and do what is sent until the pipe ends."""
-    # Ctrl-C in a terminal reaches both processes: the other one ends this one.
+    # Ctrl-C in a terminal is for the other process, which then ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "setsid"):
+        os.setsid()
     try:
         device = connect(address)
     except PiezotrackError as error:
@@ -224,7 +226,8 @@ class _Attendant:
                 kind, work = "close", None
             if kind == "run":
                 self.stopped.clear()
-            else:
+            elif not self.stopped.is_set():
+                # Once: what comes again would end the way to rest in one step.
                 self.stopped.set()
                 with self.turn:
                     if self.at_work:

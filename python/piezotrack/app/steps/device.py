@@ -10,9 +10,10 @@ import numpy as np
 
 from ..._support.units import best_length_unit, length_text
 from ...errors import DataError, DeviceError, Interrupted, ParameterError
-from ...hardware.measuring import measure
+from ...hardware.measuring import RAMP, measure
 from .. import parts
 from ..code import command, plain
+from ..device import IN_USE
 from ..state import LogState, State
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def recording(desk: Desk) -> list[Part]:
         "Record a log",
         parts.select("wave", "Drive", state.wave, list(WAVES.items())),
         parts.number("frequency", "Frequency", state.frequency, "Hz"),
-        parts.number("rate", "Sampling rate", _rate(desk, USUAL_RATE), "Hz"),
+        parts.number("rate", "Sampling rate", _rate(desk), "Hz"),
         step="device",
     )
     drive["buttons"] = [
@@ -70,7 +71,7 @@ def recording(desk: Desk) -> list[Part]:
         "measure",
         _drive(desk),
         device=desk.device.facts.address,
-        rate=f"{plain(_rate(desk, USUAL_RATE))}Hz",
+        rate=f"{plain(_rate(desk))}Hz",
         out="measured.csv",
     )
     return [*first(desk, "log"), drive, parts.code("record-code", "Record as a command", line)]
@@ -92,8 +93,7 @@ def first(desk: Desk, step: str) -> list[Part]:
     if fault := limits_fault(desk):
         return [limits, parts.messages("limits-fault", parts.message("red", fault))]
     low, high = limits_of_device(desk)
-    stroked = _stroked(desk)
-    busy = desk.device is not None and desk.device.busy
+    stroked, busy = _stroked(desk), _busy(desk)
     limits["buttons"] = [
         parts.action("Slow first stroke", f"{step}.stroke", primary=not stroked, disabled=busy)
     ]
@@ -142,10 +142,14 @@ def limits_fault(desk: Desk) -> str:
     return ""
 
 
-def _rate(desk: Desk, usual: float) -> float:
+def _rate(desk: Desk) -> float:
+    """Return the sampling rate of a record [Hz]."""
+    return desk.state.device.rate or _near(desk, USUAL_RATE)
+
+
+def _near(desk: Desk, rate: float) -> float:
     lowest, highest = facts_of(desk).rates
-    rate = desk.state.device.rate
-    return min(max(usual, lowest), highest) if rate is None else rate
+    return min(max(rate, lowest), highest)
 
 
 def _stroked(desk: Desk) -> bool:
@@ -157,7 +161,12 @@ def _stroked(desk: Desk) -> bool:
 
 def ready(desk: Desk) -> bool:
     """Whether the device rests, and has been moved slowly over what is used."""
-    return desk.device is not None and not desk.device.busy and _stroked(desk)
+    return not _busy(desk) and _stroked(desk)
+
+
+def _busy(desk: Desk) -> bool:
+    """Whether this window, or another one, moves the device."""
+    return "device" in desk.running or (desk.device is not None and desk.device.busy)
 
 
 def _drive(desk: Desk) -> str:
@@ -173,8 +182,8 @@ def _drive(desk: Desk) -> str:
 def begin(desk: Desk, work: Any, ended: Callable[[Any], None], tell: Tell = lambda _: None) -> None:
     """Do something with the device in the background; `ended` gets what it gives."""
     device = desk.device
-    if device is None or device.busy:
-        raise DeviceError("the device is in use: wait until it is at rest, or press STOP")
+    if device is None or _busy(desk):
+        raise DeviceError(IN_USE)
 
     def run(job: Job) -> None:
         def told(found: object) -> None:
@@ -211,9 +220,8 @@ def stroke(desk: Desk, _: Mapping[str, Any]) -> None:
 
     span = f"{plain(low)}..{plain(high)}V"
     drive = f"triangle:{plain(1.0 / STROKE)}Hz,{span},{plain(STROKE)}s"
-    rates = facts_of(desk).rates
-    rate = min(max(STROKE_RATE, rates[0]), rates[1])
-    begin(desk, partial(_measured, drive=drive, rate=rate), ended)
+    rate = _near(desk, STROKE_RATE)
+    begin(desk, partial(_measured, drive=drive, rate=rate, ramp=STROKE / 4.0), ended)
 
 
 def _record(desk: Desk, _: Mapping[str, Any]) -> None:
@@ -224,7 +232,7 @@ def _record(desk: Desk, _: Mapping[str, Any]) -> None:
         desk.on_device["record"] = log
         desk.changed("log.recorded")
 
-    work = partial(_measured, drive=_drive(desk), rate=_rate(desk, USUAL_RATE))
+    work = partial(_measured, drive=_drive(desk), rate=_rate(desk))
     begin(desk, work, ended)
 
 
@@ -244,8 +252,8 @@ def _recorded(desk: Desk, _: Mapping[str, Any]) -> None:
 # In the process of the device, which is why they are functions of the module.
 
 
-def _measured(device: Device, _: Tell, *, drive: str, rate: float) -> Dataset:
-    return measure(device, drive, rate)
+def _measured(device: Device, _: Tell, *, drive: str, rate: float, ramp: float = RAMP) -> Dataset:
+    return measure(device, drive, rate, ramp=ramp)
 
 
 def _stroke_chart(desk: Desk, stroke: Dataset) -> Part:
