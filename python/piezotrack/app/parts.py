@@ -45,6 +45,7 @@ __all__ = [
     "slider",
     "table",
     "text",
+    "unpacked",
 ]
 
 Part = dict[str, Any]
@@ -60,6 +61,11 @@ LOOP = 0.5
 def packed(values: ArrayLike) -> str:
     """Pack numbers as 8 bytes each, lowest first, in base64."""
     return base64.b64encode(np.asarray(values, dtype="<f8").tobytes()).decode()
+
+
+def unpacked(text: str) -> Array:
+    """Return the numbers in a text of `packed`."""
+    return np.frombuffer(base64.b64decode(text), dtype="<f8")
 
 
 class Plotter:

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import base64
+import re
+from importlib.resources import files
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from .._support.display.look import figure_style, look
 from .._support.files.writing import save_figures
 from .._support.messages import quoted
 from ..errors import ParameterError
-from .desk import Download
-from .desk import drawing as one_by_one
-from .parts import Plotter
+from .desk import Download, drawing
+from .parts import Plotter, unpacked
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from .desk import Desk
     from .parts import Part
@@ -30,24 +27,10 @@ __all__ = ["picture"]
 # Pixels from side to side to which lines are thinned: 170 mm at 300 dots per inch.
 PIXELS = 2000
 
-# Size on a screen [inch], and colours of lines by their role.
+# Size on a screen [inch], and colours by role: those of the light page.
 WIDE, HALF = (7.0, 3.0), (5.0, 3.6)
-COLOURS = {
-    "measured": "#3b4754",
-    "simulated": "#d1495b",
-    "drive": "#14537d",
-    "desired": "#3b4754",
-    "first": "#8a6fb0",
-    "second": "#14537d",
-    "third": "#d1495b",
-    "error": "#b0562a",
-    "noise": "#808995",
-    "accepted": "#808995",
-    "true": "#1b7f4b",
-    "bad": "#b3261e",
-    "plant": "#14537d",
-    "unstable": "#b3261e",
-}
+CSS = files(__package__).joinpath("static", "app.css").read_text(encoding="utf-8")
+COLOURS = dict(re.findall(r"--(\w+): (#\w{6})", CSS.partition("}")[0]))
 
 
 def _figure(chart: Part) -> Figure:
@@ -86,10 +69,10 @@ def _figure(chart: Part) -> Figure:
 
 
 def _line(ax: Axes, line: Part) -> None:
-    x, y, colour = _unpacked(line["x"]), _unpacked(line["y"]), COLOURS[line["role"]]
+    x, y, colour = unpacked(line["x"]), unpacked(line["y"]), COLOURS[line["role"]]
     if "to" in line:
         ax.fill_between(
-            x, y, _unpacked(line["to"]), color=colour, alpha=0.22, lw=0, label=line["name"]
+            x, y, unpacked(line["to"]), color=colour, alpha=0.22, lw=0, label=line["name"]
         )
     elif line.get("marks") or line.get("dots"):
         size = 4.0 if line.get("marks") else 1.0
@@ -99,10 +82,6 @@ def _line(ax: Axes, line: Part) -> None:
         dash = "--" if line.get("dash") else "-"
         width = 1.4 if line.get("wide") else 0.9
         ax.plot(x, y, dash, color=colour, lw=width, drawstyle=style, label=line["name"])
-
-
-def _unpacked(text: str) -> NDArray[np.float64]:
-    return np.frombuffer(base64.b64decode(text), dtype="<f8")
 
 
 def _named(axis: Part) -> str:
@@ -141,6 +120,6 @@ def picture(desk: Desk, page: Callable[[Desk], Iterable[Part]], name: str) -> Do
     chart = charts[name]
     if name in zoom:
         chart = {**chart, "view": zoom[name]}
-    with one_by_one, figure_style("paper", width=f"{use.width}mm", formats=[use.picture]):
+    with drawing, figure_style("paper", width=f"{use.width}mm", formats=[use.picture]):
         (path,) = save_figures({name: _figure(chart)}, desk.place("picture"))
     return Download(path.name, path.read_bytes())

@@ -71,8 +71,8 @@ class LogState:
         As of `piezotrack.read`.
     resample : float or None
         As of `piezotrack.read` [s].
-    hold : {"foh", "zoh"}
-        As of `piezotrack.read`.
+    hold : {"zoh"} or None
+        As of `piezotrack.read`; None for its default.
     decimate : int
         As of `Dataset.decimate`.
     zero : bool
@@ -89,7 +89,7 @@ class LogState:
     dt: float | None = None
     missing: Literal["drop", "fill"] | None = None
     resample: float | None = None
-    hold: Literal["foh", "zoh"] = "foh"
+    hold: Literal["zoh"] | None = None
     decimate: int = 1
     zero: bool = False
     window: Span | None = None

@@ -82,7 +82,7 @@ def record_of(desk: Desk) -> Dataset:
     path = desk.file("log", state.source)
 
     def compute() -> Dataset:
-        log = read(path, **columns_of(state), resample=state.resample, hold=state.hold)
+        log = read(path, **columns_of(state), resample=state.resample, hold=state.hold or "foh")
         log = log if state.decimate <= 1 else log.decimate(state.decimate)
         return log.zeroed() if state.zero else log
 
@@ -174,7 +174,7 @@ class LogStep:
             repr(state.source),
             **columns_of(state),
             resample=state.resample,
-            hold=None if state.hold == "foh" else state.hold,
+            hold=state.hold,
         )
         lines = ["import piezotrack as pt", "", reading]
         if state.decimate > 1:
@@ -216,7 +216,7 @@ def log_options(state: LogState) -> dict[str, Any]:
     return {
         **_reading(state),
         "resample": None if state.resample is None else f"{plain(state.resample)}s",
-        "hold": None if state.hold == "foh" else state.hold,
+        "hold": state.hold,
         "decimate": state.decimate if state.decimate > 1 else None,
         "zero": state.zero,
         "window": None if window is None else f"{plain(window[0])}:{plain(window[1])}",
@@ -274,7 +274,7 @@ def _columns(state: LogState, found: LogInfo) -> Part:
             [(None, "refuse"), ("drop", "leave out"), ("fill", "interpolate")],
         )
     )
-    holds = [("foh", "linear"), ("zoh", "constant")]
+    holds = [(None, "linear"), ("zoh", "constant")]
     items.append(parts.select("hold", "Drive between samples", state.hold, holds))
     items.append(parts.check("zero", "Count from the first reading", state.zero))
     items.append(parts.number("dt", "Interval, where there are no times", state.dt, "s"))

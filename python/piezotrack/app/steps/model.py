@@ -104,7 +104,7 @@ def test_of(desk: Desk) -> Dataset:
     path = desk.file("test", state.test)
 
     def compute() -> Dataset:
-        log = read(path, missing=desk.state.log.missing, hold=desk.state.log.hold)
+        log = read(path, missing=desk.state.log.missing, hold=desk.state.log.hold or "foh")
         log = log.zeroed() if desk.state.log.zero else log
         return log if state.test_from <= log.t[0] else log[state.test_from :]
 
@@ -212,9 +212,7 @@ class ModelStep:
         else:
             cut = ".zeroed()" if desk.state.log.zero else ""
             cut += f"[{plain(state.test_from)}:]" if state.test_from else ""
-            log = desk.state.log
-            hold = None if log.hold == "foh" else log.hold
-            keywords = given({"missing": log.missing, "hold": hold})
+            keywords = given({"missing": desk.state.log.missing, "hold": desk.state.log.hold})
             lines += ["train = log", f"{call('test = pt.read', repr(state.test), **keywords)}{cut}"]
         lines.append(call("fit = pt.identify", "train", repr(trial.info.name), **arguments))
         return [*lines, "print(fit.summary())", "print(fit.score(test))"]

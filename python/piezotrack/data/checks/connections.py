@@ -49,10 +49,13 @@ class Connection(NamedTuple):
         A sentence.
     follows : bool
         Whether the displacement follows the drive all the same; else a fit means nothing.
+    swapped : bool
+        Whether the columns are probably swapped.
     """
 
     note: str
     follows: bool
+    swapped: bool = False
 
 
 def unusual_connection(u: Array, y: Array) -> Connection | None:
@@ -111,6 +114,7 @@ def unusual_connection(u: Array, y: Array) -> Connection | None:
             f"the displacement leads the drive, by {100.0 * lead:.2g} % of the travel{noisy}: are "
             "the columns swapped, or is the drive read late?",
             follows=False,
+            swapped=True,
         )
     return None
 

@@ -96,8 +96,8 @@ def record_flags(data: Dataset) -> list[RecordFlag]:
     # A displacement that jumps lags or leads by chance.
     connection = None if jumps else unusual_connection(whole.u, whole.y)
     if connection is not None:
-        swapped = "swapped" in connection.note
-        flags.append(RecordFlag("swapped" if swapped else "connection", connection.note))
+        kind: Literal["swapped", "connection"] = "swapped" if connection.swapped else "connection"
+        flags.append(RecordFlag(kind, connection.note))
         if not connection.follows:
             return flags
     units = [*_units(whole), *_seldom(data)]

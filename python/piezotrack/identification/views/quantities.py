@@ -222,8 +222,6 @@ def _creep(model: IdentifiedModel) -> list[Row]:
         return []
     each = ", ".join(f"{100.0 * w:.2g} % in {t:.3g} s" for w, t in parts)
     reach = _reach(model, lambda stage: math.fsum(stage.creep_weights), 100.0)
-    if len(parts) == 1 and not reach:
-        return [("creep", each)]
     whole = f"{100.0 * math.fsum(w for w, _ in parts):.2g}{reach} %"
     return [("creep", f"{whole}: {each}" if len(parts) > 1 else f"{whole} in {parts[0][1]:.3g} s")]
 
