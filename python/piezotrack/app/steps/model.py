@@ -387,6 +387,10 @@ def _of_model(desk: Desk, trial: Trial) -> list[Part]:
     ]
     lines = [plot.over_time("m-error", t, to_fine * error, "measured less model", "error")]
     if trial.band is not None:
+        edges = (simulated + way * scale * trial.band.half for way in (1.0, -1.0))
+        loop[:0] = [
+            plot.in_plane("m-loop", times * test.u, edge, "band of 95 %", "noise") for edge in edges
+        ]
         half = to_fine * trial.band.half
         kept = plot.kept("m-error", t, half)
         lines.append(parts.band(t[kept], -half[kept], half[kept], "band of 95 %", "noise"))
