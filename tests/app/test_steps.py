@@ -15,6 +15,7 @@ import pytest
 import piezotrack as pt
 from commands import ran
 from page.window import Window
+from piezotrack.app.parts import unpacked
 from piezotrack.app.steps import PAGES, model
 from piezotrack.app.steps.closed_loop import controller_of, range_of, reach_of, run_of
 from piezotrack.app.steps.motion import controllers
@@ -196,6 +197,21 @@ def test_what_is_unusual_has_a_place_and_a_button(window: Window, tmp_path: Path
     window.do(fix["do"], step=fix["step"], values=fix["values"])
     assert window.desk.state.log.window == pytest.approx((0.0, 13.0))
     assert not any("jumps" in one["text"] for one in window.parts["log.flags"]["items"])
+
+
+def test_hum_is_marked_in_a_spectrum(window: Window, tmp_path: Path) -> None:
+    t = np.arange(8000) / 1000.0
+    u = 30.0 - 30.0 * np.cos(2.0 * np.pi * t)
+    noise = np.random.default_rng(1).normal(0.0, 5e-9, t.size)
+    for hum in (0.0, 40e-9):
+        y = 5e-7 * u + noise + hum * np.sin(2.0 * np.pi * 50.02 * t)
+        opened(window, pt.Dataset(u=u, y=y, dt=1e-3), tmp_path, f"hum{hum}.csv")
+        page = window.do("whole")[0]["changed"]
+        assert ("log.hum" in page) == bool(hum)
+    (mark,) = page["log.hum"]["regions"]
+    assert 0.5 * (mark["from"] + mark["to"]) == pytest.approx(50.0, abs=0.2)
+    amplitudes = unpacked(page["log.hum"]["lines"][0]["y"])
+    assert amplitudes.max() == pytest.approx(40.0, rel=0.1)
 
 
 def test_swapped_columns_are_exchanged_by_a_button(window: Window, tmp_path: Path) -> None:

@@ -252,3 +252,23 @@ def test_a_clipped_drive_and_a_sensor_at_its_end_are_found_where_they_are() -> N
     ended = record_flags(pt.Dataset(u=u, y=np.minimum(5e-7 * u, 25e-6), t=t))
     (flag,) = (one for one in ended if one.kind == "end")
     assert len(flag.spans) == 8
+
+
+@pytest.mark.parametrize("shape", ["sine", "triangle"])
+@pytest.mark.parametrize("mains", [50.02, 59.97])
+def test_hum_is_found_in_the_log_with_its_amplitude(shape: str, mains: float) -> None:
+    t = np.arange(8000) / 1000.0
+    phase = t % 1.0
+    wave = (
+        np.cos(2.0 * np.pi * phase) if shape == "sine" else 1.0 - 4.0 * np.minimum(phase, 1 - phase)
+    )
+    u = 50.0 - 50.0 * wave
+    plays = pt.PrandtlIshlinskiiStage(linear=4e-7, thresholds=(10.0, 25.0), weights=(1e-7, 5e-8))
+    y = plays.simulate(u, 1e-3).x + np.random.default_rng(1).normal(0.0, 20e-9, t.size)
+    assert record_flags(pt.Dataset(u=u, y=y, dt=1e-3)) == []
+    (flag,) = record_flags(pt.Dataset(u=u, y=y + 50e-9 * np.sin(2.0 * np.pi * mains * t), dt=1e-3))
+    assert flag.kind == "hum"
+    assert flag.quick is not None
+    (line,) = flag.quick.hum
+    assert line.frequency == pytest.approx(mains, abs=0.2)
+    assert line.amplitude == pytest.approx(50e-9, rel=0.1)

@@ -278,3 +278,30 @@ def test_the_bits_do_not_depend_on_threads(threads: int) -> None:
 def test_wrong_input_gets_one_sentence(given: dict[str, Any], said: str) -> None:
     with pytest.raises(pt.ParameterError, match=f"^{said}"):
         with_drift(record(seconds=10.0), **given)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", [False, True])
+def test_the_deviation_of_a_drift_is_its_scatter(tmp_path: Path, line: bool) -> None:
+    t = DT * np.arange(2000)
+    u = 30.0 * (1.0 - np.cos(np.pi * t))
+    plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(10.0, 20.0), weights=(3e-7, 1e-7))
+    moved = 4e-8 * t if line else 4e-7 * np.exp(-t / 3.0)
+    method = pt.LeastSquares(thresholds=[10.0, 20.0], creep=False, dynamics=None, dead_zones=0)
+    errors, deviations = [], []
+    for seed in range(20):
+        noise = np.random.default_rng(seed).normal(0.0, 20e-9, t.size)
+        data = pt.Dataset(u=u, y=plays.simulate(u, DT).x + moved + noise, dt=DT)
+        fit = pt.identify(data, "prandtl-ishlinskii", method=method, drift=True)
+        assert fit.drift is not None
+        assert fit.drift.deviation is not None
+        errors.append(fit.drift.moved - (moved[-1] - moved[0]))
+        deviations.append(fit.drift.deviation)
+    # Of 20 the scatter itself is known to 16 % (one standard deviation).
+    assert np.std(errors) == pytest.approx(np.median(deviations), rel=0.5)
+    assert np.mean(np.abs(errors) < 1.96 * np.array(deviations)) >= 0.8
+    reach = re.search(r"drift .*[0-9] \+- ([0-9.]+) um", fit.summary())
+    assert reach is not None
+    assert float(reach[1]) == pytest.approx(1.96e6 * deviations[-1], rel=0.5)
+    again = pt.load(fit.save(tmp_path / "drift.json"))
+    assert again.drift == fit.drift

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ..parts import Part
     from ..state import LogState
 
-__all__ = ["MARKED", "ROLES", "UNITS", "fixes", "flags", "key", "key_of", "places"]
+__all__ = ["MARKED", "ROLES", "UNITS", "fixes", "flags", "flags_of", "key", "key_of", "places"]
 
 ROLES = {"time": "Time", "drive": "Drive", "displacement": "Displacement"}
 UNITS = {

@@ -19,7 +19,7 @@ from .. import parts
 from ..code import call, command, given, plain
 from ..desk import Download, Same
 from .device import RECORDING, recording
-from .flags import MARKED, ROLES, UNITS, fixes, flags, key, key_of, places
+from .flags import MARKED, ROLES, UNITS, fixes, flags, flags_of, key, key_of, places
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -49,6 +49,8 @@ SUBJECTS = {
 }
 # Length of a drive that is suggested [s].
 SUGGESTED = 30.0
+# Highest frequency of a spectrum with hum, and half of the width of a mark in it [Hz].
+HIGHEST, WIDTH = 350.0, 1.5
 
 
 def columns_of(state: LogState) -> dict[str, Any]:
@@ -158,6 +160,7 @@ class LogStep:
             _drive_chart(desk, found, log, part),
             _displacement_chart(desk, part),
             _loop_chart(desk, part),
+            *_hum_chart(desk, part),
             _lights(found),
             *_next(desk),
             parts.code("code", "The same in Python", "\n".join(self.python(desk))),
@@ -355,6 +358,23 @@ def _loop_chart(desk: Desk, part: Dataset) -> Part:
         f"{drive}, displacement over drive."
     )
     return parts.chart("loop", "Loop", words, ("drive", drive), ("displacement", unit), [line])
+
+
+def _hum_chart(desk: Desk, part: Dataset) -> list[Part]:
+    """Draw the spectrum of the quick part of the displacement, where it has hum."""
+    quick = next((flag.quick for flag in flags_of(desk, part) if flag.quick), None)
+    if quick is None:
+        return []
+    shown = slice(1, int(np.searchsorted(quick.frequencies, HIGHEST)))
+    line = desk.plotter.over_time(
+        "hum", quick.frequencies[shown], 1e9 * quick.amplitudes[shown], "displacement", "measured"
+    )
+    regions = [parts.region(f - WIDTH, f + WIDTH, "hum", "bad") for f, _ in quick.hum]
+    words = "The displacement without its loop and what is slower than the mains: " + ", ".join(
+        f"{1e9 * size:.3g} nm at {f:.4g} Hz" for f, size in quick.hum
+    )
+    axes = ("frequency", "Hz"), ("amplitude", "nm")
+    return [parts.chart("hum", "Hum", f"{words}.", *axes, [line], regions=regions)]
 
 
 def _lights(found: LogInfo) -> Part:

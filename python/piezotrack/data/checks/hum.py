@@ -1,4 +1,4 @@
-"""Hum of the mains in what a fit leaves."""
+"""Hum of the mains in a displacement, and in what a fit leaves of it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.polynomial import Chebyshev
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["Line", "hum_lines", "hum_notes", "power_of"]
+__all__ = ["Line", "Quick", "hum_lines", "hum_notes", "power_of", "quick_part"]
 
 # Frequencies of the mains [Hz], how far they wander, and how many harmonics are looked for.
 MAINS, WANDERS, HARMONICS = (50.0, 60.0), 0.2, 10
@@ -24,6 +25,8 @@ CYCLES, AROUND = 20.0, 12.0
 STANDS_OUT, SHARE = 6.0, 0.03
 # Amplitude of the drive at a line, as the mean gain makes it, from which the line is the drive's.
 DRIVEN = 0.3
+# Degree of a mean loop, too low to follow a drive's higher harmonics.
+DEGREE = 9
 # Longest residual that is looked at, and values of its spectrum to a bin.
 LOOKED_AT, FINE = 400_000, 4
 
@@ -126,18 +129,89 @@ def _amplitudes(values: Array, dt: float) -> tuple[Array, Array]:
     return frequencies, scaled
 
 
+class Quick(NamedTuple):
+    """What is quicker than the mains in a displacement.
+
+    Attributes
+    ----------
+    frequencies, amplitudes : ndarray, shape (m,)
+        Its spectrum: the amplitude [m] of a sine of each frequency [Hz].
+    hum : list of Line
+        The mains in it, as `hum_lines`.
+    """
+
+    frequencies: Array
+    amplitudes: Array
+    hum: list[Line]
+
+
+def quick_part(u: Array, y: Array, dt: float) -> Quick:
+    """Look for the mains in a displacement itself, less the mean loop and what is slower.
+
+    Parameters
+    ----------
+    u, y : ndarray, shape (n,)
+        Drive [V] and displacement [m].
+    dt : float
+        Sampling interval [s].
+
+    Returns
+    -------
+    Quick
+        Empty of a record that is too short, or sampled too slowly.
+
+    Examples
+    --------
+    >>> t = np.arange(5000) / 1000.0
+    >>> u = np.sin(2.0 * np.pi * t)
+    >>> y = 1e-6 * u + 2e-8 * np.sin(2.0 * np.pi * 50.0 * t)
+    >>> [f"{f:.0f} Hz, {1e9 * size:.0f} nm" for f, size in quick_part(u, y, 1e-3).hum]
+    ['50 Hz, 20 nm']
+    """
+    width = round(1.0 / (MAINS[0] * dt))
+    if width < 2 or y.size * dt * MAINS[0] < CYCLES or np.ptp(u) == 0.0:
+        return Quick(np.empty(0), np.empty(0), [])
+    u, y = u[:LOOKED_AT], y[:LOOKED_AT]
+    rest = y - _mean_loop(u, y, width)
+    # The mean over a period of each of the mains has nothing of either.
+    slow = rest
+    for mains in MAINS:
+        count = round(1.0 / (mains * dt))
+        sums = np.cumsum(np.concatenate([[0.0], slow]))
+        slow = (sums[count:] - sums[:-count]) / count
+    whole = slice((y.size - slow.size) // 2, (y.size - slow.size) // 2 + slow.size)
+    rest = rest[whole] - slow
+    return Quick(*_amplitudes(rest, dt), hum_lines(rest, u[whole], y[whole], dt))
+
+
+def _mean_loop(u: Array, y: Array, width: int) -> Array:
+    """Return the displacement as a polynomial of the drive, one upwards and one downwards."""
+    places = 2.0 * (u - u.min()) / np.ptp(u) - 1.0
+    later = np.minimum(np.arange(u.size) + width, u.size - 1)
+    up = u[later] > u[np.maximum(later - 2 * width, 0)]
+    mean = np.zeros_like(y)
+    for part in (up, ~up):
+        if np.count_nonzero(part) > 2 * HARMONICS:
+            mean[part] = Chebyshev.fit(places[part], y[part], DEGREE, domain=[-1.0, 1.0])(
+                places[part]
+            )
+    return mean
+
+
 def power_of(lines: Sequence[Line]) -> float:
     """Return the mean square of lines [m^2]."""
     return 0.5 * math.fsum(line.amplitude**2 for line in lines)
 
 
-def hum_notes(lines: Sequence[Line]) -> list[str]:
-    """Say which lines of the mains a residual has.
+def hum_notes(lines: Sequence[Line], where: str = "is left") -> list[str]:
+    """Say which lines of the mains a residual or a record has.
 
     Parameters
     ----------
     lines : sequence of Line
         The lines.
+    where : str, optional
+        Verb and place.
 
     Returns
     -------
@@ -153,4 +227,4 @@ def hum_notes(lines: Sequence[Line]) -> list[str]:
         return []
     first, *others = (f"{f:.4g} Hz with {{}}{1e9 * size:.3g} nm" for f, size in lines)
     texts = [first.format("an amplitude of "), *(one.format("") for one in others)]
-    return [f"hum of the mains is left: {', '.join(texts)}"]
+    return [f"hum of the mains {where}: {', '.join(texts)}"]

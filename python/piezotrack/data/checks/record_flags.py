@@ -10,6 +10,7 @@ import numpy as np
 from ..._support.units import drive_text, length_text
 from .connections import unusual_connection
 from .diagnostics import TURN, has_steps, runs, turns
+from .hum import hum_notes, quick_part
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..dataset import Dataset
+    from .hum import Quick
 
     Array = NDArray[np.float64]
 
@@ -48,18 +50,21 @@ class RecordFlag(NamedTuple):
     ----------
     kind : str
         "note" of the reader, "far" readings, "connection", "swapped" columns, "unit", "period",
-        "clipped" drive, "end" of the sensor, or "jump".
+        "clipped" drive, "end" of the sensor, "jump", or "hum" of the mains.
     note : str
         A sentence.
     spans : tuple of (float, float)
         First and last time of each place [s]; empty where it is the whole record.
+    quick : Quick or None
+        Spectrum in which the hum is, of "hum".
     """
 
     kind: Literal[
-        "note", "far", "connection", "swapped", "unit", "period", "clipped", "end", "jump"
+        "note", "far", "connection", "swapped", "unit", "period", "clipped", "end", "jump", "hum"
     ]
     note: str
     spans: tuple[tuple[float, float], ...] = ()
+    quick: Quick | None = None
 
 
 def record_flags(data: Dataset) -> list[RecordFlag]:
@@ -85,7 +90,15 @@ def record_flags(data: Dataset) -> list[RecordFlag]:
     >>> flag.kind, flag.spans
     ('jump', ((2.5, 2.501),))
     """
-    data = data.measured
+    whole = data.measured.without_far_readings()
+    quick = quick_part(whole.u, whole.y, whole.dt)
+    notes = hum_notes(quick.hum, "in the displacement")
+    hum = [RecordFlag("hum", note, quick=quick) for note in notes]
+    return [*_flags(data.measured), *hum]
+
+
+def _flags(data: Dataset) -> list[RecordFlag]:
+    """Return all flags but hum."""
     flags = [RecordFlag("note", note) for note in data.notes]
     if np.ptp(data.u) == 0.0 or np.ptp(data.y) == 0.0:
         return flags
@@ -109,6 +122,8 @@ def record_flags(data: Dataset) -> list[RecordFlag]:
 def record_warnings(data: Dataset) -> list[str]:
     """Warnings about a record that do not depend on the model.
 
+    Without hum, which a fit finds in its residual.
+
     Parameters
     ----------
     data : Dataset
@@ -130,7 +145,7 @@ def record_warnings(data: Dataset) -> list[str]:
     a stroke of 40 m is not that of a nanopositioner: is the unit of the displacement right? It \
 would be 40 um if it is 1e6 too large, as um taken as m
     """
-    return [flag.note for flag in record_flags(data)]
+    return [flag.note for flag in _flags(data.measured)]
 
 
 def _seldom(data: Dataset) -> list[str]:

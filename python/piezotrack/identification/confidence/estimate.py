@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import DataError, PiezotrackError
-from ..fitted.certainty.covariance import Covariance, NoiseShares
+from ..fitted.certainty.covariance import Covariance, NoiseShares, is_hidden
 from ..solve.search import details_of
 from ..solve.selection import SAME_PERIOD, period_of
 from .held_out import held_out
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
+    from ..fitted.drift import Drift
     from ..fitted.estimates import Estimate
     from ..fitted.identification import Identification
     from ..fitted.identified_model import IdentifiedModel
@@ -69,7 +70,11 @@ def with_covariance(fit: Identification) -> Identification:
         for name, estimate in fit.parameters.items()
     }
     several = tuple(
-        replace(one, parameters=_of_record(one.parameters, own))
+        replace(
+            one,
+            parameters=_of_record(one.parameters, own),
+            drift=one.drift and replace(one.drift, deviation=own.get("drift")),
+        )
         for one, own in zip(fit.records, known, strict=True)
     )
     entries = dict(fit.details.get("parameters", {}))
@@ -78,7 +83,12 @@ def with_covariance(fit: Identification) -> Identification:
     if DELAY in parameters:
         details[DELAY] = details_of(parameters[DELAY])
     return replace(
-        fit, covariance=covariance, parameters=parameters, records=several, details=details
+        fit,
+        covariance=covariance,
+        parameters=parameters,
+        records=several,
+        drift=several[0].drift,
+        details=details,
     )
 
 
@@ -118,22 +128,43 @@ def _of_each_record(
     if len(free) == 1 and DELAY in free[0] and DELAY in covariance.names:
         known[0][DELAY] = covariance.deviation(DELAY)
         free[0].remove(DELAY)
+    for own, record in zip(free, fit.records, strict=True):
+        own |= set(record.drift.slopes) if record.drift else set()
     if not any(free):
         return known
     values = fitted_values(fit)
-    sizes = sizes_of(fit, values, records[0][0].dt)
     rows = [(r, name) for r, one in enumerate(linear) for name in one.alone if name in free[r]]
+    of_rows = [_size_alone(fit.records[r].drift, name) for r, name in rows]
+    sizes = np.append(sizes_of(fit, values, records[0][0].dt), of_rows)
     extended = [
-        _Linear(_with_rows(one, r, rows), data, weight, np.append(sizes, np.ones(len(rows))))
+        _Linear(_with_rows(one, r, rows), data, weight, sizes)
         for r, (one, (data, weight)) in enumerate(zip(linear, records, strict=True))
     ]
-    precision = np.diag(np.append(_precision(fit, values) * sizes**2, np.zeros(len(rows))))
-    matrix, determined, *_ = _core.linearised_covariance(
-        [record.thinned(MOST) for record in extended], precision.tolist(), 0, SEED
+    precision = np.append(_precision(fit, values), np.zeros(len(rows))) * sizes**2
+    matrix, determined, *_, hidden = _core.linearised_covariance(
+        [record.thinned(MOST) for record in extended], np.diag(precision).tolist(), 0, SEED
     )
     for k, (r, name) in enumerate(rows, start=len(values)):
-        known[r][name] = math.sqrt(matrix[k][k]) if determined[k] else math.inf
+        known[r][name] = sizes[k] * math.sqrt(matrix[k][k]) if determined[k] else math.inf
+    unseen = np.array(hidden).reshape(-1, sizes.size)
+    for r, record in enumerate(fit.records):
+        if record.drift:
+            slopes = record.drift.slopes
+            here = [slopes[name] if at == r and name in slopes else 0.0 for at, name in rows]
+            slope = sizes * np.append(np.zeros(len(values)), here)
+            known[r]["drift"] = (
+                math.inf
+                if is_hidden(unseen, slope)
+                else math.sqrt(max(float(slope @ np.array(matrix) @ slope), 0.0))
+            )
     return known
+
+
+def _size_alone(drift: Drift | None, name: str) -> float:
+    """Size of what belongs to a record alone, 1 of its unit where it is not that of a drift."""
+    if drift is None:
+        return 1.0
+    return {"drift": abs(drift.amplitude), "drift_time": drift.time}.get(name, 1.0) or 1.0
 
 
 def _with_rows(linear: Sensitivity, record: int, rows: list[tuple[int, str]]) -> Sensitivity:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
@@ -48,6 +49,9 @@ class Drift:
         First and last instant of the window that was fitted, on the record's own time axis [s].
     time_fitted : bool
         Whether the time constant was fitted too.
+    deviation : float or None
+        Standard deviation of `moved` [m], infinite where the record does not determine it; None
+        where it is not known.
     """
 
     amplitude: float
@@ -55,6 +59,7 @@ class Drift:
     begin: float
     end: float
     time_fitted: bool = True
+    deviation: float | None = None
 
     @classmethod
     def _fading(cls, part: float, time: float, data: Dataset, *, time_fitted: bool) -> Self:
@@ -67,6 +72,15 @@ class Drift:
     def moved(self) -> float:
         """Change of the reading along the window [m]."""
         return self.amplitude * float(np.expm1((self.begin - self.end) / self.time))
+
+    @property
+    def slopes(self) -> dict[str, float]:
+        """Change of `moved` with ``"drift"``, the amplitude, and ``"drift_time"`` if fitted."""
+        lasting = (self.begin - self.end) / self.time
+        slopes = {"drift": float(np.expm1(lasting))}
+        if self.time_fitted:
+            slopes["drift_time"] = -self.amplitude * float(np.exp(lasting)) * lasting / self.time
+        return slopes
 
     def __str__(self) -> str:
         return (
@@ -178,14 +192,15 @@ def drift_entry(drift: Drift | None) -> dict[str, Any]:
     """
     if drift is None:
         return {}
-    return {
-        "drift": {
-            "amplitude": {"value": drift.amplitude, "unit": "m"},
-            "time": {"value": drift.time, "unit": "s", "free": drift.time_fitted},
-            "begin": {"value": drift.begin, "unit": "s"},
-            "end": {"value": drift.end, "unit": "s"},
-        }
+    entry = {
+        "amplitude": {"value": drift.amplitude, "unit": "m"},
+        "time": {"value": drift.time, "unit": "s", "free": drift.time_fitted},
+        "begin": {"value": drift.begin, "unit": "s"},
+        "end": {"value": drift.end, "unit": "s"},
     }
+    if drift.deviation is not None and math.isfinite(drift.deviation):
+        entry["moved"] = {"value": drift.moved, "deviation": drift.deviation, "unit": "m"}
+    return {"drift": entry}
 
 
 def drift_of(entry: Any) -> Drift | None:
@@ -223,7 +238,13 @@ def drift_of(entry: Any) -> Drift | None:
             f"{values['end']:g} s",
             f"no instant before its begin, {values['begin']:g} s",
         )
+    moved = object_of("drift: moved", drift.get("moved"))
+    deviation = _core.as_number("drift: moved", moved["deviation"]) if moved else None
+    if deviation is not None and not 0.0 <= deviation < LARGEST:
+        expected = f"a deviation from 0 to {LARGEST:g}"
+        raise ParameterError("drift: moved", f"{deviation:g}", expected)
     return Drift(
+        deviation=deviation,
         time=time_constant("drift: time", time["value"]),
         # Files of before have no such entry.
         time_fitted=time.get("free", True) is True,

@@ -10,6 +10,7 @@ from ..._support.units import length_text, of_drive, shown_unit
 from ...errors import NumericalError
 from ...stages.slow_loop import SlowLoop
 from ..confidence.sensitivity import gradient
+from ..fitted.certainty.covariance import normal_reach
 from ..fitted.notes import start_notes
 
 if TYPE_CHECKING:
@@ -29,6 +30,8 @@ Row = tuple[str, str]
 STRAIGHT = 5.0
 # Share of the travel from which on a loop is wide enough to show.
 CLOSED = 1e-6
+# Level of the intervals that are written.
+LEVEL = 0.95
 
 
 def rows(quantities: Iterable[Row], indent: int = 2) -> list[str]:
@@ -89,7 +92,7 @@ def of_sensor(sensor: FittedRecord | IdentifiedModel, data: Dataset | None = Non
     """
     rows: list[Row] = []
     if sensor.delay or "delay" in getattr(sensor, "parameters", {}):
-        rows.append(("delay", f"{1e3 * sensor.delay:.4g} ms{_spread(sensor)}"))
+        rows.append(("delay", _delay(sensor)))
     if sensor.drift:
         rows.append(("drift", _drift(sensor.drift)))
     if sensor.offset_fitted:
@@ -203,8 +206,8 @@ def _reach(model: IdentifiedModel, quantity: Callable[[Any], float], scale: floa
     covariance = model.covariance
     if covariance is None or model.drive_range is None:
         return ""
-    reach = scale * float(covariance.reach(gradient(model, lambda near: quantity(near.model))))
-    return f" +- {reach:.1g}" if math.isfinite(reach) else ""
+    slopes = gradient(model, lambda near: quantity(near.model))
+    return _half(scale * float(covariance.reach(slopes, LEVEL)))
 
 
 def _lag(stage: Any) -> float:
@@ -227,19 +230,26 @@ def _creep(model: IdentifiedModel) -> list[Row]:
 
 
 def _drift(drift: Drift) -> str:
+    moved = f"{1e6 * drift.moved:.3g}{_interval(drift.deviation, 1e6)} um over the record"
     lasting = drift.end - drift.begin
     if lasting > 0.0 and drift.time > STRAIGHT * lasting:
-        return f"{1e6 * drift.moved / lasting:.3g} um/s, {1e6 * drift.moved:.3g} um over the record"
-    return f"{1e6 * drift.moved:.3g} um over the record, time constant {drift.time:.3g} s"
+        return f"{1e6 * drift.moved / lasting:.3g} um/s, {moved}"
+    return f"{moved}, time constant {drift.time:.3g} s"
 
 
-def _spread(own: FittedRecord | IdentifiedModel) -> str:
-    """Write the standard deviation of a delay, where it is known."""
+def _delay(own: FittedRecord | IdentifiedModel) -> str:
     estimate = getattr(own, "parameters", {}).get("delay")
     deviation = None if estimate is None else estimate.deviation
-    if deviation is None or not math.isfinite(deviation):
-        return ""
-    return f" +- {1e3 * deviation:.2g} ms"
+    return f"{1e3 * own.delay:.4g}{_interval(deviation, 1e3)} ms"
+
+
+def _interval(deviation: float | None, scale: float) -> str:
+    """Write half of the 95 % interval of a standard deviation, where it is known."""
+    return "" if deviation is None else _half(scale * normal_reach(LEVEL) * deviation)
+
+
+def _half(reach: float) -> str:
+    return f" +- {reach:.1g}" if math.isfinite(reach) else ""
 
 
 def _errors(

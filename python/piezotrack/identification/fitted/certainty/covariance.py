@@ -27,6 +27,7 @@ __all__ = [
     "NoiseShares",
     "covariance_entry",
     "covariance_of_file",
+    "is_hidden",
     "normal_reach",
 ]
 
@@ -259,9 +260,7 @@ class Covariance:
         """
         normal = normal_reach(level)
         variances = (gradient**2) * np.diag(self.matrix)
-        if np.any(
-            np.abs(self.hidden @ gradient) > UNSEEN * (np.abs(self.hidden) @ np.abs(gradient))
-        ):
+        if is_hidden(self.hidden, gradient):
             return math.inf
         whole = float(variances.sum())
         widening = float(variances @ self.widening) / whole if whole > 0.0 else 1.0
@@ -288,6 +287,25 @@ class Covariance:
         if name not in self.names:
             raise ParameterError("name", quoted(name), f"one of {', '.join(self.names)}")
         return self.names.index(name)
+
+
+def is_hidden(hidden: Array, gradient: Array) -> bool:
+    """Whether a quantity changes with what has no effect on the records.
+
+    Parameters
+    ----------
+    hidden : ndarray, shape (m, p)
+        Changes of the values without effect, as `Covariance.hidden`.
+    gradient : ndarray, shape (p,)
+        Change of the quantity with each value.
+
+    Returns
+    -------
+    bool
+        Whether the records do not determine it.
+    """
+    moved = np.abs(hidden @ gradient)
+    return bool(np.any(moved > UNSEEN * (np.abs(hidden) @ np.abs(gradient))))
 
 
 def normal_reach(level: float) -> float:
