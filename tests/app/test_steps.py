@@ -76,12 +76,13 @@ def test_the_script_makes_the_same_controller(
     window.do("go", to="loop")
     window.finish()
     window.set("loop", kp=2e4)
-    files = dict(window.take(f"use.{one}") for one in ("controller", "script"))
+    files = dict(window.take(f"use.{one}") for one in ("model", "controller", "script"))
     monkeypatch.chdir(tmp_path)
     pt.datasets.dbo_training().save("training.csv")
     script = Path("steps.py")
     script.write_bytes(files["piezotrack_steps.py"])
     exec(compile(script.read_text(), "steps.py", "exec"), {})
+    assert Path("dahl.json").read_bytes() == files["dahl.json"]
     made, kept = pt.load_controller("controller.json"), tmp_path / "page.json"
     kept.write_bytes(files["controller.json"])
     assert made.feedback == pt.load_controller(kept).feedback

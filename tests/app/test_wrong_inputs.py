@@ -32,7 +32,7 @@ def window() -> Iterator[Window]:
         device.close()
 
 
-AT_ONCE: list[tuple[str, str, float]] = [
+AT_ONCE: list[tuple[str, str, float | str]] = [
     ("log", "dt", -1.0),
     ("log", "resample", -1.0),
     ("log", "decimate", 0),
@@ -51,6 +51,8 @@ AT_ONCE: list[tuple[str, str, float]] = [
     ("device", "frequency", -1.0),
     ("device", "trials", 0),
     ("device", "cutoff", -1.0),
+    ("use", "name", "2 stages"),
+    ("use", "name", ""),
 ]
 WRONG: list[tuple[str, dict[str, Any], str, str]] = [
     # Step, values, the control that has to stay, and a word of the sentence.
@@ -73,13 +75,14 @@ WRONG: list[tuple[str, dict[str, Any], str, str]] = [
 
 
 @pytest.mark.parametrize(("step", "name", "value"), AT_ONCE)
-def test_a_number_out_of_range_is_refused_at_once(
-    window: Window, step: str, name: str, value: float
+def test_what_is_out_of_range_is_refused_at_once(
+    window: Window, step: str, name: str, value: float | str
 ) -> None:
     before = window.desk.state
     error = window.set(step, **{name: value})["error"]
     assert error["control"] == name
-    assert f"{name} is {value:g}" in error["text"]
+    shown = repr(value) if isinstance(value, str) else f"{value:g}"
+    assert f"{name} is {shown}" in error["text"]
     assert window.desk.state == before
 
 

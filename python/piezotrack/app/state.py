@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, Union, get_args, get_origin, get
 
 from .._support.messages import quoted
 from ..errors import DataError, ParameterError
+from ..export.c99.sources import checked_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -397,12 +398,12 @@ def checked(kind: type[Any], values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _in_range(name: str, value: Any) -> Any:
-    """Return a number of a setting that has to be above 0, or not below it."""
+    """Return a setting that has to be above 0, not below it, or a name in C."""
     if value is not None and name in ABOVE and value <= 0:
         raise ParameterError(name, f"{value:g}", "a number above 0")
     if value is not None and name in NOT_BELOW and value < 0:
         raise ParameterError(name, f"{value:g}", "0 or a number above it")
-    return value
+    return checked_name(value) if name == "name" else value
 
 
 def _of_type(name: str, value: Any, hint: Any) -> Any:

@@ -12,6 +12,7 @@ from .campaigns.result import TaskResult as TaskResult
 from .comparison.compare import Comparison as Comparison
 from .comparison.compare import ModelScore as ModelScore
 from .comparison.compare import compare as compare
+from .comparison.validation import validated as validated
 from .confidence.posterior_models import posterior_models as posterior_models
 from .confidence.residuals.residual import Ingredient as Ingredient
 from .confidence.residuals.residual import Residual as Residual

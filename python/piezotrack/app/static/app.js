@@ -8,7 +8,7 @@ const $ = (id) => document.getElementById(id);
 const main = $("page");
 const fragment = new URLSearchParams(location.hash.slice(1));
 const token = fragment.get("token") ?? "";
-let socket, step, download, retry = 0, sent = 0;
+let socket, step, download, taken = "", retry = 0, sent = 0;
 // Of what is dragged, one message is on its way and the latest one waits.
 let busy = null, waiting = null;
 const begun = new Map();
@@ -96,7 +96,14 @@ function receive(answer) {
   $("redo").disabled = !answer.redo;
   $("stop").hidden = !answer.running;
   $("halt").hidden = !answer.device;
-  $("running").textContent = answer.running ? `computing: ${answer.running}` : "";
+  if (answer.download) {
+    taken = `saved: ${answer.download}`;
+    setTimeout(() => {
+      if ($("running").textContent === taken) $("running").textContent = "";
+      taken = "";
+    }, 5000);
+  }
+  $("running").textContent = answer.running ? `computing: ${answer.running}` : taken;
   const fault = answer.error;
   if (answer.seq || fault) say(fault && !faultAt(main, fault.control, fault.text) ? fault.text : "");
   keep(answer.link);

@@ -62,7 +62,7 @@ class LoopStep:
         report = report_of(desk, controller_of(desk))
         if not _stable(desk, report):
             return "red", "unstable"
-        rms = run_of(desk, controller_of(desk)).score(true=True).rms_error
+        _, rms = _rms(run_of(desk, controller_of(desk)))
         worst = max(one.sensitivity for _, one in report.cases)
         words = f"{length_text(rms, 3)} rms, Ms {worst:.2g}"
         return ("amber" if worst > FRAGILE * 1.005 else "green"), words
@@ -290,6 +290,14 @@ def _last_period(run: Tracking) -> Any:
     return run.t >= begin - 1e-9
 
 
+def _rms(run: Tracking) -> tuple[float, float]:
+    """Return the measured and the true error over one settled period, rms [m]."""
+    part = _last_period(run)
+    errors = (run.desired[part] - one[part] for one in (run.measured, run.displacement))
+    measured, true = (float(np.sqrt(np.nanmean(one**2))) for one in errors)
+    return measured, true
+
+
 def _error_chart(desk: Desk, run: Tracking, before: Tracking | None) -> Part:
     """Draw the measured and the true error over one settled period."""
     part = _last_period(run)
@@ -308,7 +316,7 @@ def _error_chart(desk: Desk, run: Tracking, before: Tracking | None) -> Part:
                 "l-error", before.t[kept], scale * error, "accepted", "accepted", dash=True
             )
         )
-    rms = [length_text(float(np.sqrt(np.nanmean(one[part] ** 2))), 3) for one in (measured, true)]
+    rms = [length_text(one, 3) for one in _rms(run)]
     words = f"Over one settled period: {rms[0]} rms measured, {rms[1]} rms true."
     return parts.chart("l-error", "Error", words, ("time", "s"), ("error", unit), lines)
 

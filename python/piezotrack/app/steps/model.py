@@ -215,7 +215,8 @@ class ModelStep:
             keywords = given({"missing": desk.state.log.missing, "hold": desk.state.log.hold})
             lines += ["train = log", f"{call('test = pt.read', repr(state.test), **keywords)}{cut}"]
         lines.append(call("fit = pt.identify", "train", repr(trial.info.name), **arguments))
-        return [*lines, "print(fit.summary())", "print(fit.score(test))"]
+        judged = "fit, score = pt.identification.validated(fit, test)"
+        return [*lines, judged, "print(fit.summary())", "print(score)"]
 
     def commands(self, desk: Desk) -> list[str]:
         """Identify the chosen model."""
@@ -299,6 +300,7 @@ def _cards(desk: Desk, trials: Trials) -> Part:
     chosen = chosen_trial(desk)
     worst = done[-1].score.rms if done and done[-1].score else 1.0
     noise = min((one.fit.noises[0] for one in done if one.fit is not None), default=0.0)
+    running = "models" in desk.running
     items = []
     for trial in [*done, *(one for one in trials.rows.values() if one.score is None)]:
         title = trial.info.title
@@ -320,16 +322,15 @@ def _cards(desk: Desk, trials: Trials) -> Part:
             cost = f", {length_text(trial.course[-1][1], 3)}" if trial.course else ""
             card |= {
                 "light": "grey",
-                "value": "fitting",
+                "value": "fitting" if running else "stopping",
                 "text": f"{len(trial.course)} iterations{cost}",
             }
         else:
-            running = "models" in desk.running
             card |= {"light": "grey", "value": "waits" if running else "stopped", "text": ""}
         items.append(card)
     words = f"Error on the test, rms; the mark is the noise of the sensor, {length_text(noise, 3)}"
     page = parts.cards("cards", words if done else "Models, quickest first", *items, step="model")
-    page["buttons"] = [] if "models" in desk.running else [parts.action("Fit again", "model.fit")]
+    page["buttons"] = [] if running else [parts.action("Fit again", "model.fit")]
     return page
 
 

@@ -28,7 +28,16 @@ def validated(fit: Identification, data: Dataset) -> tuple[Identification, Score
     fit : Identification
         The same, with the score in its details.
     score : Score
-        The score.
+        The score, as of `IdentifiedModel.score`.
+
+    Examples
+    --------
+    >>> import piezotrack as pt
+    >>> log = pt.datasets.dbo_training()
+    >>> fit = pt.identify(log[:11.0], "prandtl-ishlinskii")
+    >>> fit, score = pt.identification.validated(fit, log[11.0:])
+    >>> fit.details["validation"]["rms"]["value"] == score.rms
+    True
     """
     score = fit.score(data)
     validation = {
