@@ -376,3 +376,17 @@ fn the_worst_stage_counts_and_a_fast_low_pass_is_left_out() {
     let few = Tuning { tolerances: vec![1e-6], ..motions };
     assert!(few.costs(&places, NEVER).unwrap_err().to_string().contains("tolerances"));
 }
+
+/// A response that is flat but for creep has no peaks: rounding would add thousands of places.
+#[test]
+fn a_flat_plant_has_a_short_grid() {
+    let (fast, slow) = (1.0 / 0.0667, 1.0 / 5.0);
+    let rates = [-fast, 0.0, 0.0, -slow];
+    let creeping = LoopPlant::state_space(&rates, &[fast, slow], &[2.0e-6, 0.5e-6], 7e-6).unwrap();
+    let ringing = LoopPlant::mode(7e-6, 40.0, 0.02).unwrap();
+    let places =
+        |plant: &LoopPlant| PlantSet::new(std::slice::from_ref(plant), 5e-3).unwrap().places();
+    assert!(places(&creeping) <= 401);
+    // A mode is still looked at closely.
+    assert!(places(&ringing) > 430);
+}

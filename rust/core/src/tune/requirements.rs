@@ -206,6 +206,12 @@ impl PlantSet {
         self.responses.is_empty()
     }
 
+    /// Number of frequencies at which the margins are read off.
+    #[must_use]
+    pub fn places(&self) -> usize {
+        self.delta.len()
+    }
+
     /// Sampling interval, s.
     #[must_use]
     pub fn dt(&self) -> f64 {
@@ -377,13 +383,18 @@ fn grid(plants: &[(Ratio, usize)]) -> Vec<f64> {
     angles
 }
 
+/// Rise above a place beside it, as a share, from which a peak is no rounding of a flat response.
+const FLAT: f64 = 1e-10;
+
 /// Angle and width of the poles of a sampled plant, rad: from peaks of its response.
 fn modes(ratio: &Ratio) -> Vec<(f64, f64)> {
     const FINE: usize = 4096;
     let angle = |k: usize| PI * small(k) / small(FINE);
     let size: Vec<f64> = (1..FINE).map(|k| of(ratio, unit(angle(k))).norm()).collect();
-    let peaks =
-        size.windows(3).enumerate().filter(|(_, near)| near[1] > near[0] && near[1] > near[2]);
+    let peaks = size.windows(3).enumerate().filter(|(_, near)| {
+        let lower = near[0].min(near[2]);
+        near[1] > near[0].max(near[2]) && near[1] > lower * (1.0 + FLAT)
+    });
     peaks
         .map(|(k, _)| {
             let place = angle(k + 2);
