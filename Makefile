@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs crate-docs architecture pictures notices c-library c-header c-header-test sentences clean
+.PHONY: help demo reproduce benchmark test soak studies fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs crate-docs architecture pictures notices c-library c-header c-header-test sentences clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -46,7 +46,10 @@ rust-checks: lint-rust rust-test c-library
 
 soak: fuzz ## The tests that take long: fuzzers, properties, examples, searches with full budgets
 	PROPTEST_CASES=$(CASES) PROPTEST_RNG_SEED=$(SEED) cargo test --locked --release -p piezotrack-core --test properties
-	$(BIN)/pytest -n auto -m slow --ignore=tests/soak
+	$(BIN)/pytest -n auto --dist worksteal -m "slow and not study" --ignore=tests/soak
+
+studies: $(VENV)/installed $(VENV)/tools ## Rates over many records: coverage of intervals, choices, false alarms; half an hour
+	$(BIN)/pytest -n auto --dist worksteal -m study
 
 fuzz: $(VENV)/installed $(VENV)/tools ## The fuzzers, with their table of tries and failures: SEED=7 CALLS=1000000 FILES=100000
 	$(BIN)/pytest -n auto --dist worksteal -m slow tests/soak --soak-seed=$(SEED) --soak-calls=$(CALLS) --soak-files=$(FILES) --soak-table=$(TABLE) --soak-loop=$(LOOP)
@@ -80,7 +83,7 @@ no-std: ## The control crate where there is no std and no allocator
 	fi
 
 python-test: $(VENV)/installed $(VENV)/tools c-library ## Tests of the package, its docstrings and pages
-	$(BIN)/pytest -n auto --dist worksteal -m "not slow"
+	$(BIN)/pytest -n auto --dist worksteal -m "not slow and not study"
 
 # Beside the Python module, so that the compiled crates are those of the wheel.
 c-library: $(VENV)/pip ## The C library: target/release/libpiezotrack.a and .so; header in rust/capi/include

@@ -54,6 +54,7 @@ WORK = {
     "compare-controllers": [
         *("compare-controllers", "dahl.json", "--controllers", "PID", "--frequencies", "0.5,1,2"),
         *("--dt", "0.02", "--limits", "0:75", "--noise", "60nm"),
+        *("--runs", "1", "--draws", "1"),
     ],
     # Each seed is a controller of its own.
     "export": ["export", "SEED.json", "--name", "axis"],
@@ -89,12 +90,22 @@ def content(folder: str) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
 
 
+def wait_for_writing(process: subprocess.Popen[bytes], out: str) -> None:
+    """Wait until a command begins to write, or has ended."""
+    while process.poll() is None:
+        if Path(out).is_dir() and any(is_temporary(one) for one in os.listdir(out)):
+            return
+        time.sleep(0.002)
+
+
 def whole(work: list[str], seed: int) -> tuple[dict[str, bytes], float]:
-    """What a command writes, and how long it takes."""
-    begun = time.monotonic()
-    with start(work, f"whole{seed}", seed) as process:
+    """What a command writes, and how long it takes to write it."""
+    out = f"whole{seed}"
+    with start(work, out, seed) as process:
+        wait_for_writing(process, out)
+        begun = time.monotonic()
         assert process.wait() == 0
-    return content(f"whole{seed}"), time.monotonic() - begun
+    return content(out), time.monotonic() - begun
 
 
 def kill_often(work: list[str], tries: int) -> None:
@@ -104,6 +115,7 @@ def kill_often(work: list[str], tries: int) -> None:
     differing = [name for name in old if old[name] != new[name]]
     assert len(differing) > 2
     moments = random.Random(5)
+    hit = 0
     for number in range(tries):
         out = f"out{number}"
         Path(out).mkdir()
@@ -111,10 +123,11 @@ def kill_often(work: list[str], tries: int) -> None:
             Path(out, name).write_bytes(data)
         slowly = bool(number % 2)
         with start(work, out, 2, slowly=slowly) as process:
-            # Most of what is written is written at the end.
-            threading.Event().wait(moments.uniform(0.4, 1.05) * took + 0.5 * slowly)
+            wait_for_writing(process, out)
+            threading.Event().wait(moments.uniform(0.0, 1.0) * (took + 0.5 * slowly))
             process.kill()
         files = content(out)
+        hit += any(is_temporary(name) or name == MARKER for name in files)
         assert all(files[name] in (old[name], new[name]) for name in old), "torn"
         mixed = len({files[name] == new[name] for name in differing}) == 2
         assert MARKER in files or not mixed, "mixed"
@@ -124,14 +137,10 @@ def kill_often(work: list[str], tries: int) -> None:
         files = content(out)
         del files["next.json"]
         assert files in (old, new)
-
-
-@pytest.mark.slow
-def test_a_killed_command_leaves_no_torn_or_mixed_results() -> None:
-    kill_often(WORK["track"], 4)
+    assert hit >= tries // 3, "killed before or after the writing"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", WORK)
 def test_commands_that_are_killed_often_leave_no_torn_or_mixed_results(name: str) -> None:
-    kill_often(WORK[name], 40)
+    kill_often(WORK[name], 12)

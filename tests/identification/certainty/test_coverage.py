@@ -68,7 +68,7 @@ def test_intervals_cover(case: str, noise: str, records: int) -> None:
         assert independent < 0.75
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("noise", [one for one in NOISES.NOISES if one != NOISES.RICHER])
 @pytest.mark.parametrize("case", REGULAR)
 def test_intervals_cover_with_every_model_and_noise(case: str, noise: str) -> None:

@@ -173,7 +173,7 @@ def test_a_measured_stage_under_another_motion_is_unchanged() -> None:
     assert 1.3 < health["residual"].value < 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_the_rates_of_false_alarms_and_of_hits() -> None:
     judged, alarms, hits = 0, Counter[str](), Counter[str]()
     draw = np.random.default_rng(11)

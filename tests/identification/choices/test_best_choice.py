@@ -37,7 +37,7 @@ def test_no_choice_named_is_better_than_the_default(seed: int) -> None:
     assert ratio(bench(), seed) < 1.03
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_hardly_a_choice_named_is_better_on_fifty_records() -> None:
     choices = bench()
     ratios = np.array([ratio(choices, seed) for seed in range(50)])
