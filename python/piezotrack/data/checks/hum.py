@@ -130,7 +130,7 @@ def _amplitudes(values: Array, dt: float) -> tuple[Array, Array]:
 
 
 class Quick(NamedTuple):
-    """What is quicker than the mains in a displacement.
+    """The part of a displacement that is as quick as the mains.
 
     Attributes
     ----------
