@@ -294,7 +294,7 @@ impl<F: Feedback> Controller<F> {
         let unclipped = if unclipped.is_finite() { unclipped } else { last.volts };
         let volts = self.limits.clip(unclipped);
         state.excess = volts - unclipped;
-        state.last = Command {
+        let command = Command {
             volts,
             unclipped,
             feedforward: used,
@@ -305,7 +305,8 @@ impl<F: Feedback> Controller<F> {
             measurement_ok,
             reference_ok: reference_fits && feedforward_ok,
         };
-        state.last
+        state.last = command;
+        command
     }
 
     /// Whether a feedforward far outside the limits is valid, and what is used in its place.

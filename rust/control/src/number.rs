@@ -37,6 +37,14 @@ pub trait Number:
 
     /// Whether `self < 0` in any lane.
     fn any_negative(self) -> bool;
+
+    /// The larger of two numbers, lane by lane; `self` where one is NaN.
+    #[must_use]
+    fn larger(self, other: Self) -> Self;
+
+    /// The smaller of two numbers, lane by lane; `self` where one is NaN.
+    #[must_use]
+    fn smaller(self, other: Self) -> Self;
 }
 
 impl Number for f64 {
@@ -71,5 +79,15 @@ impl Number for f64 {
     #[inline(always)]
     fn any_negative(self) -> bool {
         self < 0.0
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        if self < other { other } else { self }
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        if other < self { other } else { self }
     }
 }

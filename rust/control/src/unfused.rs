@@ -85,4 +85,14 @@ impl Number for Unfused {
     fn any_negative(self) -> bool {
         self.0 < 0.0
     }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        Self(self.0.larger(other.0))
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        Self(self.0.smaller(other.0))
+    }
 }

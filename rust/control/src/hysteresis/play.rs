@@ -105,7 +105,7 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Play<N, PLAYS, ZONES> {
         let mut slope = self.linear;
         for (i, play) in plays.iter_mut().enumerate() {
             let (low, high) = (input - self.thresholds[i], input + self.thresholds[i]);
-            *play = larger(low, smaller(high, *play));
+            *play = low.larger(high.smaller(*play));
             // A play moves with the input where it touches the side that pushes it.
             let gap = branch.direction.where_negative(*play - high, low - *play);
             slope = slope + gap.where_negative(zero, self.weights[i]);
@@ -124,21 +124,39 @@ impl<const PLAYS: usize, const ZONES: usize> Play<f64, PLAYS, ZONES> {
         input: N,
         (used, zones): (usize, usize),
     ) -> N {
-        let number = |value: f64| input.like(value);
-        let zero = number(0.0);
         let way = input - state.input;
-        let mut value = number(self.linear) * input;
-        let mut slope = number(self.linear);
+        let output = self.moved(&mut state.plays, input, (used, zones));
+        let zero = input.like(0.0);
+        let mut slope = input.like(self.linear);
         let settings = self.thresholds.iter().zip(&self.weights);
-        for ((threshold, weight), play) in settings.zip(&mut state.plays).take(used) {
-            let (threshold, weight) = (number(*threshold), number(*weight));
+        for ((threshold, weight), play) in settings.zip(&state.plays).take(used) {
+            let (threshold, weight) = (input.like(*threshold), input.like(*weight));
             let (low, high) = (input - threshold, input + threshold);
-            *play = larger(low, smaller(high, *play));
             let gap = way.where_negative(*play - high, low - *play);
             slope = slope + gap.where_negative(zero, weight);
-            value = value + weight * *play;
         }
         (state.input, state.slope) = (input, slope);
+        output
+    }
+
+    /// Moves the plays with the input to `input` (V) and returns the output, as
+    /// [`Self::follow_used`], where the slope is of no use.
+    #[inline(always)]
+    pub fn moved<N: Number>(
+        &self,
+        plays: &mut [N; PLAYS],
+        input: N,
+        (used, zones): (usize, usize),
+    ) -> N {
+        let number = |value: f64| input.like(value);
+        let mut value = number(self.linear) * input;
+        let settings = self.thresholds.iter().zip(&self.weights);
+        for ((threshold, weight), play) in settings.zip(plays).take(used) {
+            let threshold = number(*threshold);
+            *play = (input - threshold).larger((input + threshold).smaller(*play));
+            value = value + number(*weight) * *play;
+        }
+        let zero = number(0.0);
         let mut bent = value;
         let settings = self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights);
         for (corner, bend) in settings.take(zones) {
@@ -229,14 +247,4 @@ impl<N: Number, const PLAYS: usize, const ZONES: usize> Operator<N> for Play<N, 
 #[inline(always)]
 fn one<N: Number>(like: N) -> N {
     like.like(1.0)
-}
-
-#[inline(always)]
-fn larger<N: Number>(a: N, b: N) -> N {
-    (a - b).where_negative(b, a)
-}
-
-#[inline(always)]
-fn smaller<N: Number>(a: N, b: N) -> N {
-    (a - b).where_negative(a, b)
 }

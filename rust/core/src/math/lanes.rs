@@ -145,4 +145,24 @@ impl<S: Simd, const K: usize> Number for Lanes<S, K> {
         }
         any
     }
+
+    #[inline(always)]
+    fn larger(mut self, other: Self) -> Self {
+        for k in 0..K {
+            let (one, other) = (self.vectors[k], other.vectors[k]);
+            let mask = self.simd.less_than_f64s(one, other);
+            self.vectors[k] = self.simd.select_f64s(mask, other, one);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn smaller(mut self, other: Self) -> Self {
+        for k in 0..K {
+            let (one, other) = (self.vectors[k], other.vectors[k]);
+            let mask = self.simd.less_than_f64s(other, one);
+            self.vectors[k] = self.simd.select_f64s(mask, other, one);
+        }
+        self
+    }
 }

@@ -186,15 +186,18 @@ struct Plays<'a> {
 /// State of a stage with [`Plays`].
 #[derive(Clone, Copy)]
 struct PlaysState<N> {
-    operator: PlayState<N, MOST_PLAYS>,
+    /// Voltage, and the output of each play, V.
+    input: N,
+    plays: [N; MOST_PLAYS],
     relaxation: RelaxationState<N>,
 }
 
 impl Plays<'_> {
     #[inline(always)]
-    fn follow<N: Number>(&self, state: &mut PlayState<N, MOST_PLAYS>, volts: N) -> N {
+    fn follow<N: Number>(&self, state: &mut PlaysState<N>, volts: N) -> N {
         let of = &self.stage.operator;
-        of.plays.follow_used(state, volts, (of.count, of.zones)) - volts.like(self.zero)
+        state.input = volts;
+        of.plays.moved(&mut state.plays, volts, (of.count, of.zones)) - volts.like(self.zero)
     }
 }
 
@@ -203,20 +206,19 @@ impl LanedPlant for Plays<'_> {
     type State<N: Number> = PlaysState<N>;
     type Flow<N: Number> = RelaxationFlow;
 
-    const VECTORS: usize = 1;
+    const VECTORS: usize = 2;
 
     fn longest(&self) -> f64 {
         f64::INFINITY
     }
 
     fn start<N: Number>(&self, number: N) -> PlaysState<N> {
-        let PlayState { input, plays, slope } = self.start.operator;
-        let operator = PlayState {
+        let PlayState { input, plays, .. } = self.start.operator;
+        PlaysState {
             input: number.like(input),
             plays: plays.map(|value| number.like(value)),
-            slope: number.like(slope),
-        };
-        PlaysState { operator, relaxation: self.start.relaxation.in_lanes(number) }
+            relaxation: self.start.relaxation.in_lanes(number),
+        }
     }
 
     fn flow<N: Number>(&self, _number: N, step: f64) -> RelaxationFlow {
@@ -225,12 +227,12 @@ impl LanedPlant for Plays<'_> {
 
     #[inline(always)]
     fn advance<N: Number>(&self, flow: &RelaxationFlow, state: &mut PlaysState<N>, from: N, to: N) {
-        let jumped = from - state.operator.input;
+        let jumped = from - state.input;
         if jumped.any_negative() || (-jumped).any_negative() {
-            let output = self.follow(&mut state.operator, from);
+            let output = self.follow(state, from);
             self.stage.relaxation.jump(&mut state.relaxation, output);
         }
-        let output = self.follow(&mut state.operator, to);
+        let output = self.follow(state, to);
         self.stage.relaxation.step(flow, &mut state.relaxation, output);
     }
 

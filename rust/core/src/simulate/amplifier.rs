@@ -78,7 +78,7 @@ impl Amplifier {
     #[inline(always)]
     #[must_use]
     pub fn within_limits<N: Number>(&self, volts: N) -> N {
-        within(volts, volts.like(self.low), volts.like(self.high))
+        volts.larger(volts.like(self.low)).smaller(volts.like(self.high))
     }
 
     /// Works out steps of `step` seconds.
@@ -107,13 +107,8 @@ impl Amplifier {
         // Behind a ramp the output settles to trail by `trail`; the rest of the gap decays.
         let trail = (to - from) * number(flow.lag);
         let gap = (from - output - trail) * number(flow.decay) + trail;
-        let change = within(to - gap - output, number(-flow.most), number(flow.most));
+        let most = number(flow.most);
+        let change = (to - gap - output).larger(-most).smaller(most);
         (output, output + change)
     }
-}
-
-#[inline(always)]
-fn within<N: Number>(value: N, low: N, high: N) -> N {
-    let value = (value - low).where_negative(low, value);
-    (high - value).where_negative(high, value)
 }

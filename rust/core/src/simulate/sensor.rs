@@ -113,13 +113,14 @@ impl Sensor {
     }
 
     /// The nearest value that can be read, m.
+    #[inline(always)]
     pub(crate) fn quantised(&self, value: f64) -> f64 {
         if self.resolution == 0.0 {
             return value.max(-self.range).min(self.range);
         }
         // An even number of steps has one more below zero than above.
-        let lowest = -libm::round(self.range / self.resolution);
-        let code = libm::round(value / self.resolution);
+        let lowest = -(self.range / self.resolution).round();
+        let code = (value / self.resolution).round();
         code.max(lowest).min(-lowest - 1.0) * self.resolution
     }
 }
