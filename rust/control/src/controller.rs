@@ -251,6 +251,19 @@ impl<F: Feedback> Controller<F> {
         measured: f64,
         feedforward: f64,
     ) -> Command {
+        self.advance(state, reference, measured, feedforward);
+        // Here, so that what the caller does not use of it is not copied.
+        state.last
+    }
+
+    /// Computes the last command of the state.
+    fn advance<L: AsMut<[f64]>>(
+        &self,
+        state: &mut ControllerState<F::State, L>,
+        reference: f64,
+        measured: f64,
+        feedforward: f64,
+    ) {
         let measurement_ok = self.span.accepts(&mut state.readings, measured);
         let reference_fits = self.span.may_ask_for(reference);
         let (low, high) = (self.limits.low(), self.limits.high());
@@ -294,7 +307,7 @@ impl<F: Feedback> Controller<F> {
         let unclipped = if unclipped.is_finite() { unclipped } else { last.volts };
         let volts = self.limits.clip(unclipped);
         state.excess = volts - unclipped;
-        let command = Command {
+        state.last = Command {
             volts,
             unclipped,
             feedforward: used,
@@ -305,8 +318,6 @@ impl<F: Feedback> Controller<F> {
             measurement_ok,
             reference_ok: reference_fits && feedforward_ok,
         };
-        state.last = command;
-        command
     }
 
     /// Whether a feedforward far outside the limits is valid, and what is used in its place.
