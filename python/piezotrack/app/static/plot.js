@@ -249,7 +249,8 @@ export class Chart {
     g.lineTo(along ? PAD.left + this.w : at, along ? at : PAD.top + this.h);
     g.stroke();
     g.textAlign = along ? "right" : "left";
-    if (level.label) g.fillText(level.label, along ? PAD.left + this.w - 4 : at + 4, along ? at - 4 : PAD.top + 12);
+    const above = at > PAD.top + 16 ? at - 4 : at + 13;
+    if (level.label) g.fillText(level.label, along ? PAD.left + this.w - 4 : at + 4, along ? above : PAD.top + 12);
     g.restore();
   }
 

@@ -245,8 +245,9 @@ def _error_chart(desk: Desk, runs: Mapping[str, Tracking]) -> Part:
         desk.plotter.over_time("m-err", runs[name].t, scale * one, NAMES[name], ROLES[name])
         for name, one in errors.items()
     ]
-    rms = {name: length_text(float(np.sqrt(np.mean(one**2))), 3) for name, one in errors.items()}
-    words = "Error, rms: " + ", ".join(f"{NAMES[name]} {one}" for name, one in rms.items()) + "."
+    rms = {name: length_text(one.score(true=True).rms_error, 3) for name, one in runs.items()}
+    each = ", ".join(f"{NAMES[name]} {one}" for name, one in rms.items())
+    words = f"Error after the start, rms: {each}."
     view = settled_view(runs.values(), scale)
     return parts.chart("m-err", "Error", words, ("time", "s"), ("error", unit), lines, view=view)
 
