@@ -187,7 +187,8 @@ def test_what_does_not_repeat_is_forgotten_and_what_is_known_as_noise_ends_it() 
 def test_a_growing_error_ends_it_with_the_best_table() -> None:
     # A model without the mode of the stage: nothing can show that before the first trial.
     rigid = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(), weights=())
-    learning = pt.learn(replace(LINEAR, frequency=60.0), SINE, OPEN, model=rigid, noise=0.0)
+    slow = replace(LINEAR, frequency=60.0)
+    learning = pt.learn(slow, SINE, OPEN, model=rigid, noise=0.0, cutoff=250.0)
     assert learning.stopped == "grows"
     assert learning.best < len(learning.trials) - 1
     assert np.array_equal(learning.table, learning.tables[learning.best])
@@ -368,3 +369,23 @@ def test_a_long_lifted_trial_of_a_model_without_a_mode_converges() -> None:
     line = pt.triangle(frequency=2.0, low=20e-6, high=60e-6, duration=1.0, rounding=0.2)
     learner = pt.control.IterativeLearning(static, line, OPEN, method="lifted")
     assert learner.convergence.monotone
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_mode_that_the_model_lacks_lowers_the_cutoff(seed: int) -> None:
+    """The stage has a mode at 160 Hz; the model is that of a slow record, without one."""
+    model = replace(PLAYS, frequency=None, damping_ratio=None)
+    stage = pt.VirtualStage.of(PLAYS, noise=20e-9, seed=seed)
+    loop = replace(OPEN, feedforward=model.inverse())
+    reference = pt.triangle(frequency=5.0, low=10e-6, high=50e-6, duration=1.0, rounding=0.2)
+    found = pt.learn(stage, reference, loop, model=model)
+    assert found.learner.cutoff_lowered
+    assert found.learner.cutoff < 140.0
+    noise = found.trials[found.best].noise
+    assert noise is not None
+    assert found.errors[found.best] < 2.0 * noise
+    assert found.stopped != "grows"
+    # A cutoff that was given stays, and the same learning diverges with it.
+    given = pt.learn(stage, reference, loop, model=model, cutoff=250.0)
+    assert (given.learner.cutoff, given.stopped) == (250.0, "grows")
+    assert given.errors[given.best] > 1.3 * found.errors[found.best]

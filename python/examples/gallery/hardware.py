@@ -20,11 +20,11 @@ fit = pt.identify(log, "prandtl-ishlinskii")
 loop = pt.Controller(dt=1e-3, limits=(0.0, 75.0), feedforward=fit.inverse())
 
 # %%
-# Learn the line of a raster, in six trials. A slow drive shows nothing of the mode at 160 Hz, so
-# nothing is learnt near it: ``cutoff``, in Hz.
+# Learn the line of a raster, in six trials. A slow drive shows nothing of the mode at 160 Hz: the
+# first trials excite it, and the cutoff of the learning falls below it.
 
 line = pt.triangle(frequency=2.0, low=20e-6, high=80e-6, duration=2.0, rounding=0.2)
-learnt = pt.learn(device, line, loop, trials=6, cutoff=40.0)
+learnt = pt.learn(device, line, loop, trials=6)
 print(learnt.summary())
 learnt.plot()
 

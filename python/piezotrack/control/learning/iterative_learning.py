@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
@@ -17,9 +18,11 @@ from ...errors import DataError, ParameterError, ShapeError
 from ...references.reference import Reference
 from ..controller.controller import Controller
 from .plants import learning_plants
-from .rules import frequency_rule, lifted_rule
+from .rules import FrequencyRule, frequency_rule, lifted_rule
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike, NDArray
 
     from ...identification.fitted.identified_model import IdentifiedModel
@@ -107,7 +110,9 @@ class IterativeLearning:
         Learning gain, above 0 and below 2.
     cutoff : float, optional
         Frequency at which Q is a half [Hz]; default the highest, up to a quarter of the sampling
-        rate, with which a trial leaves 0.9 at most of the distance to the final table.
+        rate, with which a trial leaves 0.9 at most of the distance to the final table. The default
+        of ``"frequency"`` falls where most of the error of a trial is at harmonics at which it grew
+        beyond the noise, as at a mode that the model lacks; learning then goes on from the best.
     forgetting_factor : float, optional
         Share of the learnt voltage that is kept from trial to trial, above 0, at most 1.
     change_weight : float, optional
@@ -187,10 +192,16 @@ class IterativeLearning:
         if kept == 0.0:
             raise ParameterError("forgetting_factor", "0", "above 0, at most 1")
         self._rule: Rule
+        self._lowered: Callable[[float], FrequencyRule] | None = None
         if method == "frequency":
-            self._rule = frequency_rule(
-                nominal, plants, self._t.size, gain=step, cutoff=edge, forgetting_factor=kept
-            )
+
+            def rule(cutoff: float | None) -> FrequencyRule:
+                return frequency_rule(
+                    nominal, plants, self._t.size, gain=step, cutoff=cutoff, forgetting_factor=kept
+                )
+
+            self._rule = rule(edge)
+            self._lowered = rule if edge is None else None
         else:
             self._rule = lifted_rule(
                 nominal,
@@ -202,6 +213,9 @@ class IterativeLearning:
                 forgetting_factor=kept,
             )
         self._trials: list[LearningTrial] = []
+        self._errors: list[Array] = []
+        # The trial whose error has lowered the cutoff last.
+        self._grown = -1
         self._tables = [np.clip(self._feedforward, *controller.limits)]
 
     def __repr__(self) -> str:
@@ -273,6 +287,11 @@ class IterativeLearning:
         return self._rule.cutoff
 
     @property
+    def cutoff_lowered(self) -> bool:
+        """Whether a trial has lowered the cutoff, as the error grew at harmonics."""
+        return self._grown >= 0
+
+    @property
     def rule(self) -> Rule:
         """The update: a `FrequencyRule`, which also gives filters for firmware, or `LiftedRule`."""
         return self._rule
@@ -290,7 +309,8 @@ class IterativeLearning:
         known = [one.noise**2 for one in self._trials if one.noise is not None]
         if known and last.rms_error <= self._only_noise * float(np.sqrt(np.mean(known))):
             return "noise"
-        if last.rms_error > GROWN * min(errors):
+        # With a lower cutoff some of what was learnt is lost.
+        if last.rms_error > GROWN * min(errors[self._grown + 1 :], default=math.inf):
             return "grows"
         late = len(errors) > STALLED
         if late and min(errors[-STALLED:]) > BETTER * min(errors[:-STALLED]):
@@ -334,9 +354,25 @@ class IterativeLearning:
                 unsettled=unsettled,
             )
         )
-        learnt = self._rule.after(table - self._feedforward, error)
+        self._errors.append(error)
+        base = self._base()
+        learnt = self._rule.after(self._tables[base] - self._feedforward, self._errors[base])
         self._tables.append(np.clip(self._feedforward + learnt, low, high))
         return self.table
+
+    def _base(self) -> int:
+        """Return the trial to learn from: the last, or the best where that lowers the cutoff."""
+        last, best = len(self._trials) - 1, self.best
+        noise, clipped = self._trials[best].noise, self._trials[last].clipped
+        if last == 0 or noise is None or clipped or self._lowered is None:
+            return last
+        assert isinstance(self._rule, FrequencyRule)
+        before = self._errors[0], self._errors[min(best, last - 1)]
+        edge = self._rule.cutoff_below_growth(before, self._errors[last], noise)
+        if edge is None:
+            return last
+        self._rule, self._grown = self._lowered(edge), last
+        return best
 
     def _noise_of(self, records: Array, *, level: bool) -> float | None:
         """Rms of what does not repeat in a mean of records [m], their levels aside if not level."""

@@ -27,6 +27,9 @@ __all__ = ["Convergence", "FrequencyRule", "LiftedRule", "Rule", "frequency_rule
 ORDER = 3
 # Where a cutoff or a weight is chosen, this share of an error may remain after a trial.
 TARGET = 0.9
+# Standard deviations of the noise beyond which an error at a harmonic has grown; shares of the
+# cutoff between which that lowers it, to the first at least; share of it that a trial then leaves.
+CERTAIN, LEAST_SHARE, MOST_SHARE, AFTER_GROWTH = 4.0, 0.1, 2.0, 0.5
 # Nothing is learnt at frequencies where the feedback leaves less than this of the largest response.
 NOTHING = 1e-5
 # Longest trial of the lifted form [samples]: its matrices grow with the square of it.
@@ -168,6 +171,43 @@ class FrequencyRule:
         return np.fft.irfft(
             self.smoothing * (self.forgetting_factor * before + self.learning * wrong), self.samples
         )
+
+    def cutoff_below_growth(
+        self, before: tuple[Array, Array], after: Array, noise: float
+    ) -> float | None:
+        """Return the cutoff with which the errors that grew at harmonics fall; None where none did.
+
+        Above a tenth of the cutoff a model may lack a mode: at each harmonic whose error grew
+        beyond the noise, Q times the growth without Q comes to `AFTER_GROWTH`.
+
+        Parameters
+        ----------
+        before : (ndarray, ndarray), each of shape (n,)
+            Errors of the first trial and of the best so far [m]; what is not learnt is that of the
+            first.
+        after : ndarray, shape (n,)
+            Error of a later trial [m].
+        noise : float
+            Rms of what does not repeat in each [m].
+
+        Returns
+        -------
+        float or None
+            Below the present one [Hz].
+        """
+        small, large = np.abs(np.fft.rfft(before)).max(axis=0), np.abs(np.fft.rfft(after))
+        floor = np.sqrt(self.samples) * noise
+        places = self.frequency / self.cutoff
+        grown = (large > small + CERTAIN * np.sqrt(2.0) * floor) & (self.smoothing > 0.0)
+        grown &= (places > LEAST_SHARE) & (places < MOST_SHARE)
+        # Hysteresis moves errors between harmonics: most of what is left has to have grown.
+        if np.sum(large[grown] ** 2) <= 0.5 * np.sum(large**2):
+            return None
+        # What Q has left of the growth is in the errors.
+        ratio = large[grown] / np.maximum(small[grown], max(floor, 1e-15 * large.max()))
+        beyond = ratio / self.smoothing[grown] / AFTER_GROWTH - 1.0
+        edge = float((self.frequency[grown] / beyond ** (0.5 / ORDER)).min())
+        return max(edge, LEAST_SHARE * self.cutoff) if edge < self.cutoff else None
 
     def taps(self, half: int) -> tuple[Array, Array]:
         """Return filters without FFT, as the crate's `IterativeLearning` takes them.

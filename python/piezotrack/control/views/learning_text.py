@@ -46,7 +46,10 @@ def outcome(learning: Learning) -> list[str]:
         f"the periods of a record differ by {1e9 * abs(moved):.4g} nm in the mean, beyond the "
         "noise: the loop has not settled, the stage creeps, or the sensor drifts"
     )
+    learner = learning.learner
+    lowered = f"the cutoff fell to {learner.cutoff:.4g} Hz: above it the error grew"
     return [
+        *([lowered] if learner.cutoff_lowered else []),
         *([limited] if clipped > 0.0 else []),
         *([differs] if moved else []),
         f"ended: {WHY[learning.stopped]}",
