@@ -30,6 +30,8 @@ Row = tuple[str, str]
 STRAIGHT = 5.0
 # Share of the travel from which on a loop is wide enough to show.
 CLOSED = 1e-6
+# Half of an interval over its value from which on the value is not known at all.
+UNKNOWN = 10.0
 # Level of the intervals that are written.
 LEVEL = 0.95
 
@@ -67,8 +69,10 @@ def of_stage(model: IdentifiedModel) -> list[Row]:
     """
     stage = model.model
     rows = [*_loop(model), *_creep(model)]
-    if lag := _lag(stage):
-        rows.append(("lag", f"{1e3 * lag:.3g}{_reach(model, _lag, 1e3)} ms"))
+    if lag := 1e3 * _lag(stage):
+        known = (half := _half_width(model, _lag, 1e3)) < UNKNOWN * lag or math.isinf(half)
+        certainty = _half(half) + " ms" if known else " ms, not determined by this record"
+        rows.append(("lag", f"{lag:.3g}{certainty}"))
     if getattr(stage, "frequency", None) is not None:
         modes = [stage.frequency, *stage.mode_frequencies]
         rows.append(("mode", f"{', '.join(f'{one:.4g}' for one in modes)} Hz"))
@@ -203,11 +207,16 @@ def _loop(model: IdentifiedModel) -> list[Row]:
 
 def _reach(model: IdentifiedModel, quantity: Callable[[Any], float], scale: float = 1.0) -> str:
     """Write half of the 95 % interval of a quantity of the stage; empty where it is not known."""
+    return _half(_half_width(model, quantity, scale))
+
+
+def _half_width(model: IdentifiedModel, quantity: Callable[[Any], float], scale: float) -> float:
+    """Return half of the 95 % interval of a quantity, infinite where it is not known."""
     covariance = model.covariance
     if covariance is None or model.drive_range is None:
-        return ""
+        return math.inf
     slopes = gradient(model, lambda near: quantity(near.model))
-    return _half(scale * float(covariance.reach(slopes, LEVEL)))
+    return scale * float(covariance.reach(slopes, LEVEL))
 
 
 def _lag(stage: Any) -> float:
