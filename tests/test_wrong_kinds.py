@@ -33,8 +33,8 @@ LEARNT = pt.learn(PLAYS, SINE, BARE, trials=2)
 COMPARED = pt.compare(LOG, ["prandtl-ishlinskii", "maxwell-slip"])
 FALLING = Convergence(factor=0.5, model="plays", frequency=1.0, cases=())
 PERIODIC = FrequencyRule(
-    frequency=np.arange(5.0), learning=np.ones(5, complex), smoothing=np.ones(5), samples=8,
-    forgetting_factor=1.0, cutoff=1.0, convergence=FALLING,
+    frequency=np.arange(5.0), learning=np.ones(5, complex), samples=8,
+    forgetting_factor=1.0, cutoff=1.0, shares=(("plays", 0.5 * np.ones(5)),),
 )  # fmt: skip
 LIFTED = LiftedRule(keeping=np.eye(6), learning=np.eye(6), late=2, cutoff=1.0, convergence=FALLING)
 ARRAY = np.array([1.0, 2.0])

@@ -21,8 +21,6 @@ from .plants import learning_plants
 from .rules import FrequencyRule, frequency_rule, lifted_rule
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike, NDArray
 
     from ...identification.fitted.identified_model import IdentifiedModel
@@ -192,16 +190,11 @@ class IterativeLearning:
         if kept == 0.0:
             raise ParameterError("forgetting_factor", "0", "above 0, at most 1")
         self._rule: Rule
-        self._lowered: Callable[[float], FrequencyRule] | None = None
+        self._falls = method == "frequency" and edge is None
         if method == "frequency":
-
-            def rule(cutoff: float | None) -> FrequencyRule:
-                return frequency_rule(
-                    nominal, plants, self._t.size, gain=step, cutoff=cutoff, forgetting_factor=kept
-                )
-
-            self._rule = rule(edge)
-            self._lowered = rule if edge is None else None
+            self._rule = frequency_rule(
+                nominal, plants, self._t.size, gain=step, cutoff=edge, forgetting_factor=kept
+            )
         else:
             self._rule = lifted_rule(
                 nominal,
@@ -364,14 +357,14 @@ class IterativeLearning:
         """Return the trial to learn from: the last, or the best where that lowers the cutoff."""
         last, best = len(self._trials) - 1, self.best
         noise, clipped = self._trials[best].noise, self._trials[last].clipped
-        if last == 0 or noise is None or clipped or self._lowered is None:
+        if last == 0 or noise is None or clipped or not self._falls:
             return last
         assert isinstance(self._rule, FrequencyRule)
         before = self._errors[0], self._errors[min(best, last - 1)]
         edge = self._rule.cutoff_below_growth(before, self._errors[last], noise)
         if edge is None:
             return last
-        self._rule, self._grown = self._lowered(edge), last
+        self._rule, self._grown = replace(self._rule, cutoff=edge), last
         return best
 
     def _noise_of(self, records: Array, *, level: bool) -> float | None:

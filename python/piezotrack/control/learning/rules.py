@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
@@ -126,25 +128,38 @@ class FrequencyRule:
         Harmonics of the period, from 0 on [Hz].
     learning : ndarray of complex, shape (m,)
         Learning filter, gain and inverse of the model [V/m].
-    smoothing : ndarray, shape (m,)
-        Q, without phase.
     forgetting_factor : float
         Share of what was learnt that is kept.
     cutoff : float
         Frequency at which Q is a half [Hz].
     samples : int
         Samples of the period.
-    convergence : Convergence
-        On the models.
+    shares : tuple of (str, ndarray)
+        Share of the distance to the final table that a trial leaves without Q, of each model.
     """
 
     frequency: Array
     learning: Complex
-    smoothing: Array
     forgetting_factor: float
     cutoff: float
     samples: int
-    convergence: Convergence
+    shares: tuple[tuple[str, Array], ...]
+
+    @cached_property
+    def smoothing(self) -> Array:
+        """Q at the harmonics, shape (m,); without phase, and 0 where nothing is learnt."""
+        low_pass = 1.0 / (1.0 + (self.frequency / self.cutoff) ** (2 * ORDER))
+        return np.where(self.learning != 0.0, low_pass, 0.0)
+
+    @cached_property
+    def convergence(self) -> Convergence:
+        """Share of the distance to the final table that remains after a trial, by model."""
+        cases = []
+        for name, share in self.shares:
+            remains = self.smoothing * share
+            k = int(np.argmax(remains))
+            cases.append((name, float(remains[k]), float(self.frequency[k])))
+        return Convergence._worst(cases)
 
     def after(self, learnt: Array, error: Array) -> Array:
         """Return the next learnt voltage from the last one and its error.
@@ -255,24 +270,20 @@ def frequency_rule(
     model = nominal.response(frequency)
     excited = np.abs(model) > NOTHING * np.abs(model).max()
     learning = np.where(excited, gain / np.where(excited, model, 1.0), 0.0)
-    left = [np.abs(forgetting_factor - learning * one.response(frequency)) for one in plants]
+    without = FrequencyRule(
+        frequency=frequency,
+        learning=learning,
+        forgetting_factor=forgetting_factor,
+        cutoff=math.inf,
+        samples=samples,
+        shares=tuple(
+            (one.name, np.abs(forgetting_factor - learning * one.response(frequency)))
+            for one in plants
+        ),
+    )
 
     def made(edge: float) -> FrequencyRule:
-        smoothing = np.where(excited, 1.0 / (1.0 + (frequency / edge) ** (2 * ORDER)), 0.0)
-        cases = []
-        for plant, share in zip(plants, left, strict=True):
-            remains = smoothing * share
-            k = int(np.argmax(remains))
-            cases.append((plant.name, float(remains[k]), float(frequency[k])))
-        return FrequencyRule(
-            frequency=frequency,
-            learning=learning,
-            smoothing=smoothing,
-            forgetting_factor=forgetting_factor,
-            cutoff=edge,
-            samples=samples,
-            convergence=Convergence._worst(cases),
-        )
+        return replace(without, cutoff=edge)
 
     if cutoff is not None and (wanted := made(cutoff)).convergence.monotone:
         return wanted
