@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shlex
@@ -17,6 +18,7 @@ import pytest
 
 import piezotrack as pt
 from commands import ran
+from piezotrack.app.state import State
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -102,6 +104,45 @@ def test_from_a_dropped_log_to_a_controller(
     assert [one.get_attribute("aria-label") for one in page.query_selector_all("nav .lamp")] == [
         "green"
     ] * 5
+    assert faults == []
+
+
+def test_a_comma_is_a_decimal_point_and_words_are_no_number(
+    browser: Any, address: tuple[str, Any], tmp_path: Path
+) -> None:
+    page, faults = opened(browser, address[0])
+    page.click("text=Take the measured example")
+    page.wait_for_selector("text=What this record can determine")
+    interval = page.get_by_label("Interval, where there are no times, s")
+    for words in ("5 ms", "1,000.5"):
+        interval.fill(words)
+        interval.press("Enter")
+        page.wait_for_selector(f"text={words} is no number")
+    interval.fill("-1")
+    interval.press("Enter")
+    page.wait_for_selector("text=dt is -1: expected a number above 0")
+    interval.fill("0,005")
+    interval.press("Enter")
+    page.wait_for_selector(".fault", state="detached")
+    code = page.locator("details:has-text('The same in Python') pre")
+    page.wait_for_function("() => document.body.textContent.includes('dt=0.005')")
+    assert "dt=0.005" in (code.text_content() or "")
+    # A saved state is chosen as a log is.
+    page.keyboard.press("Tab")
+    page.keyboard.press("5")
+    page.wait_for_selector("text=Fit a model first")
+    state = tmp_path / "page.piezotrack.json"
+    # The address follows a fifth of a second later.
+    page.wait_for_timeout(1000)
+    link = page.evaluate("() => location.hash")
+    assert "state=" in link
+    state.write_text(json.dumps(State.of_link(link.partition("state=")[2]).document()), "utf-8")
+    second, _ = opened(browser, address[0])
+    second.set_input_files("input[type=file]", state)
+    second.wait_for_selector("main >> text=training.csv is not open: drop it here again")
+    second.get_by_role("button", name="Go to Log").click()
+    second.wait_for_selector("text=Drop a log here")
+    assert second.query_selector("input[type=file]")
     assert faults == []
 
 

@@ -158,6 +158,11 @@ def test_noise_is_no_log(window: Window) -> None:
     (fault,) = window.parts["log.fault"]["items"]
     assert fault["level"] == "red"
     assert fault["text"]
+    # The way on is there, and no other step repeats the sentence.
+    assert {"log.open", "log.example"} <= set(answer["order"])
+    assert fault["text"] not in [one["text"] for one in answer["rail"][1:]]
+    window.do("log.example")
+    assert window.do("whole")[0]["rail"][0]["light"] == "green"
 
 
 def test_stop_ends_the_fits_and_keeps_what_is_done(window: Window) -> None:
@@ -182,6 +187,54 @@ def test_a_state_is_the_same_page_again(window: Window) -> None:
     assert window.desk.state == before
     window.do("undo")
     assert window.desk.state.log.window is None
+
+
+def test_a_state_holds_for_the_log_that_is_opened_for_it(window: Window, tmp_path: Path) -> None:
+    log = pt.datasets.dbo_training()[3.0:13.0]
+    opened(window, log, tmp_path)
+    window.set("log", window=[4.0, 12.5])
+    window.set("motion", low=-110e-6, frequency=2.0)
+    before = window.desk.state
+    other = Window()
+    other.do("link", text=before.link())
+    assert "is not open" in other.parts["log.fault"]["items"][0]["text"]
+    opened(other, log, tmp_path)
+    assert other.desk.state == before
+    # Another record under the name that is open begins anew.
+    opened(other, log, tmp_path)
+    assert other.desk.state.motion.low is None
+    other.session.close()
+
+
+def test_an_unstable_loop_is_not_exported(window: Window) -> None:
+    window.do("log.example")
+    window.do("go", to="model")
+    window.finish()
+    window.set("loop", ki=4e8)
+    window.do("go", to="use")
+    answer, _ = window.do("whole")
+    lights = {one["step"]: one["light"] for one in answer["rail"]}
+    assert lights["loop"] == lights["use"] == "red"
+    for name in ("use.export", "use.controller"):
+        answer, content = window.do(name)
+        assert content is None
+        assert "unstable" in answer["error"]["text"]
+
+
+def test_a_motion_beyond_the_reach_is_said_beside_its_files(window: Window) -> None:
+    window.do("log.example")
+    window.do("go", to="model")
+    window.finish()
+    window.do("go", to="use")
+    assert "use.warnings" not in window.do("whole")[0]["order"]
+    window.set("motion", high=100e-6)
+    (warning,) = window.parts["use.warnings"]["items"]
+    assert "held at its limit" in warning["text"]
+    _, table = window.take("use.table")
+    volts = np.loadtxt(table.decode().splitlines(), delimiter=",", skiprows=1)[:, 1]
+    assert volts.max() == pytest.approx(3.6)
+    window.do("motion.whole")
+    assert "use.warnings" not in window.do("whole")[0]["order"]
 
 
 def test_what_is_unusual_has_a_place_and_a_button(window: Window, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from collections import OrderedDict
 from copy import copy
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from traceback import print_exception
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from ..errors import DataError, PiezotrackError
@@ -94,9 +95,17 @@ class Job:
             work(self)
         except PiezotrackError as error:
             self.error = str(error)
+        except Exception as error:
+            self.error = own_fault(error)
         finally:
             self.done = True
             self.changed()
+
+
+def own_fault(problem: Exception) -> str:
+    """Describe an error that is none of the person's; the terminal has where it arose."""
+    print_exception(problem)
+    return f"an error in piezotrack itself, {type(problem).__name__}: {problem}"
 
 
 @dataclass(frozen=True)
@@ -222,6 +231,10 @@ class Desk:
             raise DataError(f"{name} is not open: drop it here again")
         return found
 
+    def is_open(self, purpose: Purpose) -> bool:
+        """Whether a file was opened for a purpose."""
+        return purpose in self._files
+
     def place(self, name: str) -> Path:
         """Return an empty folder for files that are to be taken away."""
         place = self._folder / name
@@ -311,6 +324,11 @@ class Desk:
     def running(self) -> list[str]:
         """Names of what is computed in the background."""
         return [name for name, job in self.jobs.items() if not (job.done or job.stop.is_set())]
+
+    @property
+    def stopping(self) -> list[str]:
+        """Names of what was stopped and goes on to the end of its iteration."""
+        return [name for name, job in self.jobs.items() if job.stop.is_set() and not job.done]
 
     def faults(self, name: str) -> list[Part]:
         """Return why a computation failed, as a part of the page; nothing where it did not."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from dataclasses import replace
-from traceback import print_exception
 from typing import TYPE_CHECKING, Any
 
 from .._support.messages import quoted
 from ..errors import ParameterError, PiezotrackError
-from .desk import Desk, Download
+from .desk import Desk, Download, own_fault
 from .parts import Plotter, action, buttons, message, messages
 from .pictures import picture
 from .state import STEPS, State
@@ -106,7 +105,7 @@ class Session:
             named = getattr(problem, "argument", None)
             error = {"text": str(problem), "control": named}
         except Exception as problem:
-            error = {"text": _own_fault(problem), "control": None}
+            error = {"text": own_fault(problem), "control": None}
         answer = self._page()
         if download is not None:
             answer["download"] = download.name
@@ -189,6 +188,7 @@ class Session:
             return
         if purpose not in ("log", "test", "motion"):
             raise ParameterError("purpose", quoted(purpose), "log, test, motion or state")
+        asked_again = not self.desk.is_open(purpose)
         kept = self.desk.keep(purpose, name, content)
         step, values = {
             "log": ("log", {"source": kept}),
@@ -196,8 +196,8 @@ class Session:
             "motion": ("motion", {"kind": "file", "file": kept}),
         }[purpose]
         state = self.desk.state
-        if purpose == "log":
-            # Another record: nothing of the last one holds.
+        if purpose == "log" and not (asked_again and kept == state.log.source):
+            # Another record: nothing of the last one holds. A state that was opened holds for it.
             fresh = State()
             state = replace(state, log=fresh.log, model=fresh.model, motion=fresh.motion)
             state = replace(state, loop=fresh.loop)
@@ -215,12 +215,16 @@ class Session:
                 parts.append(part)
         except PiezotrackError as problem:
             parts.append(messages("fault", message("red", str(problem))))
+            if step != "log" and _light(desk, "log")[0] == "red":
+                parts.append(buttons("back", action("Go to Log", "go", to="log", primary=True)))
         except Exception as problem:
-            parts.append(messages("fault", message("red", _own_fault(problem))))
-        rail = []
+            parts.append(messages("fault", message("red", own_fault(problem))))
+        rail: list[dict[str, str]] = []
         for name in STEPS:
             light, sentence = _light(desk, name)
             title = PAGES[name].title
+            if any(sentence == one["text"] for one in rail if light == one["light"] == "red"):
+                light, sentence = "grey", "waits for a step above"
             rail.append({"step": name, "title": title, "light": light, "text": sentence})
             if rail[-2:-1] and rail[-2]["step"] == step and rail[-2]["light"] in ("green", "amber"):
                 parts.append(
@@ -238,6 +242,7 @@ class Session:
             "undo": bool(self._past),
             "redo": bool(self._future),
             "running": ", ".join(desk.running),
+            "stopping": ", ".join(desk.stopping),
             "device": desk.device is not None,
         }
 
@@ -248,13 +253,7 @@ def _light(desk: Desk, name: str) -> tuple[str, str]:
     except PiezotrackError as problem:
         return "red", str(problem)
     except Exception as problem:
-        return "red", _own_fault(problem)
-
-
-def _own_fault(problem: Exception) -> str:
-    """Describe an error that is none of the person's; the terminal has where it arose."""
-    print_exception(problem)
-    return f"an error in piezotrack itself, {type(problem).__name__}: {problem}"
+        return "red", own_fault(problem)
 
 
 def _step(given: Mapping[str, Any]) -> dict[str, Any]:

@@ -69,7 +69,8 @@ function upload({ purpose, file }) {
     say(`${file.name} has ${(file.size / 2 ** 20).toFixed(0)} MB: expected 64 MB at most`);
     return;
   }
-  socket.send(JSON.stringify({ do: "open", purpose, name: file.name }));
+  const kind = file.name.endsWith(".piezotrack.json") ? "state" : purpose;
+  socket.send(JSON.stringify({ do: "open", purpose: kind, name: file.name }));
   socket.send(file);
 }
 
@@ -103,7 +104,8 @@ function receive(answer) {
       taken = "";
     }, 5000);
   }
-  $("running").textContent = answer.running ? `computing: ${answer.running}` : taken;
+  const ends = answer.stopping ? `stopping: ${answer.stopping}` : taken;
+  $("running").textContent = answer.running ? `computing: ${answer.running}` : ends;
   const fault = answer.error;
   if (answer.seq || fault) say(fault && !faultAt(main, fault.control, fault.text) ? fault.text : "");
   keep(answer.link);
@@ -179,7 +181,7 @@ $("error").onclick = () => ($("error").hidden = true);
 
 document.addEventListener("keydown", (event) => {
   if (event.key === "Escape" && !$("halt").hidden) send({ do: "halt" });
-  const typing = event.target.matches("input[type=text], input[type=number], select, textarea");
+  const typing = event.target.matches("input[type=text], select, textarea");
   const key = event.key.toLowerCase();
   if ((event.ctrlKey || event.metaKey) && (key === "z" || key === "y")) {
     if (typing) return;
@@ -204,8 +206,7 @@ document.addEventListener("drop", (event) => {
   const file = event.dataTransfer.files[0];
   if (!file) return;
   const place = event.target.closest?.("[data-purpose]") ?? main.querySelector("[data-purpose]");
-  const purpose = file.name.endsWith(".piezotrack.json") ? "state" : (place?.dataset.purpose ?? "log");
-  upload({ purpose, file });
+  upload({ purpose: place?.dataset.purpose ?? "log", file });
 });
 
 let resized;

@@ -30,6 +30,18 @@ const heading = (part) => (part.title ? [element("h2", { textContent: part.title
 const inside = (item, shown) => (item.per ? shown / item.per : shown);
 const shown = (item, value) => Number(((item.per ?? 1) * value).toPrecision(6));
 
+// A field of a number: as text, for browsers drop the comma of "1,5" from fields of numbers.
+function numeral(change) {
+  const field = element("input", { type: "text", inputMode: "decimal", className: "numeral", maxLength: 40 });
+  field.onchange = () => {
+    const words = field.value.trim().replace("\u2212", "-").replace(",", ".");
+    const value = words === "" ? null : Number(words);
+    if (Number.isFinite(value) || value === null) change(value);
+    else faultIn(field.closest(".control"), `${field.value} is no number: expected one, as 1.5`);
+  };
+  return field;
+}
+
 function slider(item, change) {
   const STEPS = item.whole ? item.high - item.low : 1000;
   const log = item.scale === "log";
@@ -41,7 +53,8 @@ function slider(item, change) {
     return Number((log ? Math.exp(v) : v).toPrecision(digits));
   };
   const input = element("input", { type: "range", min: 0, max: STEPS, step: 1, value: place(item.value) });
-  const field = element("input", { type: "number", step: "any", value: shown(item, item.value) });
+  const field = numeral((value) => value !== null && change(inside(item, value), false));
+  field.value = shown(item, item.value);
   const unit = item.unit ?? "";
   const say = (v) => input.setAttribute("aria-valuetext", item.words?.[0] ? `${v}, from ${item.words[0]} to ${item.words[1]}` : `${shown(item, v)} ${unit}`);
   const send = (live) => {
@@ -55,17 +68,15 @@ function slider(item, change) {
   input.oninput = () => send(true);
   input.onchange = () => send(false);
   field.setAttribute("aria-label", `${item.label} as a number${unit ? `, ${unit}` : ""}`);
-  field.onchange = () => field.value !== "" && change(inside(item, Number(field.value)), false);
   const ends = item.words ? [element("span", { textContent: `${item.words[0]} to ${item.words[1]}` })] : [];
   return element("div", { className: "control" }, element("span", { textContent: item.label }),
     element("div", { className: "row" }, input, ...(item.words ? [] : [field, unit])), ...ends);
 }
 
 function number(item, change) {
-  const input = element("input", { type: "number", step: "any" });
+  const input = numeral((value) => change(value === null ? null : inside(item, value), false));
   if (item.value !== null) input.value = shown(item, item.value);
   if (item.placeholder) input.placeholder = item.placeholder;
-  input.onchange = () => change(input.value === "" ? null : inside(item, Number(input.value)), false);
   const label = `${item.label}${item.unit ? `, ${item.unit}` : ""}`;
   return element("label", { className: "control" }, label, input);
 }
@@ -103,7 +114,10 @@ const KINDS = { slider, number, select, check, entry, file };
 function controls(part, send) {
   const group = element("div", { className: "controls" });
   for (const item of part.items) {
-    const change = (value, live) => send({ do: "set", step: item.step ?? part.step, values: { [item.name]: value }, live });
+    const change = (value, live) => {
+      made.querySelector(".fault")?.remove();
+      send({ do: "set", step: item.step ?? part.step, values: { [item.name]: value }, live });
+    };
     const made = KINDS[item.type](item, change, send);
     made.dataset.name = item.name;
     group.append(made);
@@ -229,11 +243,16 @@ export function render(main, order, changed, send) {
 
 const shape = (part) => JSON.stringify(part.items?.map((one) => [one.name, one.low, one.high]));
 
+function faultIn(control, words) {
+  control.querySelector(".fault")?.remove();
+  control.append(element("span", { className: "fault", role: "alert", textContent: words }));
+}
+
+// Beside the control whose value is refused, until it is changed.
 export function faultAt(main, name, words) {
-  for (const old of main.querySelectorAll(".fault")) old.remove();
   if (!words || !name) return false;
   const control = [...main.querySelectorAll("[data-name]")].find((one) => one.dataset.name === name);
   if (!control) return false;
-  control.append(element("span", { className: "fault", role: "alert", textContent: words }));
+  faultIn(control, `${words}; the value before is used`);
   return true;
 }

@@ -111,6 +111,11 @@ def flags(desk: Desk, found: LogInfo, log: Dataset, part: Dataset) -> Part:
         parts.message("amber", flag.note, *_mending(state, found, part, flag))
         for flag in flags_of(desk, part)
     ]
+    items += [
+        parts.message("red" if one.verdict == "no" else "amber", one.text)
+        for one in found.determines
+        if one.subject in ("record", "loop") and one.verdict != "yes"
+    ]
     if found.time is not None and found.time.gaps:
         gaps = found.time.gaps
         words = f"{len(gaps)} gaps in the times, from {gaps[0][0]:.4g} to {gaps[0][1]:.4g} s first"

@@ -47,6 +47,9 @@ SUBJECTS = {
     "mode": "Mode",
     "record": "Record",
 }
+OPENING = (
+    "Drop a log here, or choose a file: CSV, MAT, HDF5, TDMS and others, or the state of this page"
+)
 # Length of a drive that is suggested [s].
 SUGGESTED = 30.0
 # Highest frequency of a spectrum with hum, and half of the width of a mark in it [Hz].
@@ -126,7 +129,7 @@ class LogStep:
         opening = parts.controls(
             "open",
             "",
-            parts.file("log", "Drop a log here, or choose a file: CSV, MAT, HDF5, TDMS and others"),
+            parts.file("log", OPENING),
         )
         if not state.source:
             return [
@@ -146,8 +149,16 @@ class LogStep:
                 ),
                 *recording(desk),
             ]
-        found = info_of(desk)
-        page = [opening, *recording(desk), _columns(state, found)]
+        page = [opening, *recording(desk)]
+        try:
+            found = info_of(desk)
+        except PiezotrackError as error:
+            return [
+                *page,
+                parts.messages("fault", parts.message("red", str(error))),
+                parts.buttons("example", parts.action("Take the measured example", "log.example")),
+            ]
+        page.append(_columns(state, found))
         try:
             log = record_of(desk)
             part = window_of(desk)

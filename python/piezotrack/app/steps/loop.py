@@ -60,11 +60,13 @@ class LoopStep:
         if desk.accepted is None and known_tuning(desk) is None and not by_hand(desk):
             return "grey", "not tuned yet"
         report = report_of(desk, controller_of(desk))
-        if not _stable(desk, report):
+        if not stable(desk, report):
             return "red", "unstable"
+        if known_tuning(desk) is None and not by_hand(desk):
+            return "amber", "tuned for other settings"
         _, rms = _rms(run_of(desk, controller_of(desk)))
         worst = max(one.sensitivity for _, one in report.cases)
-        words = f"{length_text(rms, 3)} rms, Ms {worst:.2g}"
+        words = f"{length_text(rms, 3)} rms true, Ms {worst:.2g} at most"
         return ("amber" if worst > FRAGILE * 1.005 else "green"), words
 
     def page(self, desk: Desk) -> Iterator[Part]:
@@ -186,7 +188,8 @@ def controller_lines(desk: Desk) -> list[str]:
     return [stage, *tuned.split("\n"), "print(tuned)", "controller = tuned.controller"]
 
 
-def _stable(desk: Desk, report: LoopReport) -> bool:
+def stable(desk: Desk, report: LoopReport) -> bool:
+    """Whether a loop is stable at all gains of the stage and within the spread."""
     return all(_case(desk, one)[0] for _, one in report.cases)
 
 

@@ -187,17 +187,22 @@ def _controls(desk: Desk) -> Part:
     return parts.controls("motion", title, *items, step="motion")
 
 
+def beyond_reach(desk: Desk) -> list[Part]:
+    """Say that the motion is beyond the reach, with what mends it; nothing where it is not."""
+    if not _beyond(desk):
+        return []
+    motion = reference_of(desk)
+    words = (
+        f"the motion goes from {1e6 * motion.low:.4g} to {1e6 * motion.high:.4g} um, beyond what "
+        "the stage reaches: the voltage is held at its limit there"
+    )
+    fix = parts.action("keep within the reach", "motion.whole")
+    return [parts.message("amber", words, *([fix] if not motion_file(desk) else []))]
+
+
 def _warnings(desk: Desk, run: Tracking) -> list[Part]:
     """Say where the motion is beyond the reach, and the drive beyond what was fitted."""
-    items = []
-    if _beyond(desk):
-        motion = reference_of(desk)
-        words = (
-            f"the motion goes from {1e6 * motion.low:.4g} to {1e6 * motion.high:.4g} um, beyond "
-            "what the stage reaches"
-        )
-        fix = parts.action("keep within the reach", "motion.whole")
-        items.append(parts.message("amber", words, *([fix] if not motion_file(desk) else [])))
+    items = beyond_reach(desk)
     model = model_of(desk)
     notes = model.extrapolation_notes(run.voltage, run.controller.dt)
     items += [parts.message("amber", note) for note in notes]
@@ -267,7 +272,7 @@ def _voltage_chart(desk: Desk, run: Tracking) -> Part:
     model, (low, high) = model_of(desk), limits_of(desk)
     unit, scale = shown_unit(model.drive_unit)
     wanted = run.feedforward
-    slew = float(np.abs(np.diff(run.voltage)).max()) / run.controller.dt if run.t.size > 1 else 0.0
+    slew = float(np.abs(np.diff(wanted)).max()) / run.controller.dt if run.t.size > 1 else 0.0
     line = desk.plotter.over_time("voltage", run.t, scale * wanted, "inverse", "second")
     far = high - low
     regions = [

@@ -12,6 +12,7 @@ from ...control.controller.controller import Controller
 from ...control.learning.learn import learn
 from ...control.on_device.playing import play
 from ...control.running.zero import zero as read_zero
+from ...control.views.learning_text import outcome
 from ...errors import DataError
 from .. import parts
 from ..code import Code, call, command, plain
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from ...references.reference import Reference
     from ..desk import Desk
     from ..device import Tell
-    from ..parts import Part
+    from ..parts import Light, Part
 
 __all__ = ["RUNNING", "running"]
 
@@ -57,7 +58,7 @@ def running(desk: Desk) -> list[Part]:
         "Follow the motion on the device",
         parts.check("zero", "Count from where it rests", state.zero),
         parts.number("trials", "Trials of learning, at most", state.trials, whole=True),
-        parts.number("cutoff", "Learn up to", state.cutoff, "Hz", placeholder="what converges"),
+        parts.number("cutoff", "Learn up to", state.cutoff, "Hz", placeholder="automatic"),
         step="device",
     )
     still = not ready(desk)
@@ -70,6 +71,14 @@ def running(desk: Desk) -> list[Part]:
     errors = desk.on_device.get("errors", [])
     if errors:
         page.append(_trials_chart(errors))
+    learnt: Learning | None = desk.on_device.get("learning")
+    if learnt is not None:
+        light: Light = "amber" if learnt.stopped in ("grows", "not settled") else "green"
+        words = (
+            f"{outcome(learnt)[-1]}; the table of trial {learnt.best} is kept, "
+            f"{length_text(float(learnt.errors[learnt.best]), 3)} rms"
+        )
+        page.append(parts.messages("learnt", parts.message(light, words)))
     if run is not None:
         page += [_run_chart(desk, run), *_files(desk)]
     page.append(parts.code("run-code", "On the device in Python", "\n".join(_python(desk))))

@@ -26,9 +26,9 @@ from .closed_loop import (
     tuned_of,
 )
 from .log import LogStep
-from .loop import LoopStep
+from .loop import LoopStep, stable
 from .model import ModelStep, chosen_trial, fit_of
-from .motion import motion_word
+from .motion import beyond_reach, motion_word
 from .on_device import RUNNING, running
 
 if TYPE_CHECKING:
@@ -61,6 +61,9 @@ class UseStep:
             return "grey", "needs a model"
         if known_tuning(desk) is None and not by_hand(desk):
             return "amber", "model only, loop not tuned"
+        controller = controller_of(desk)
+        if not stable(desk, report_of(desk, controller)):
+            return "red", "the loop is unstable"
         return "green", "model and controller"
 
     def page(self, desk: Desk) -> Iterator[Part]:
@@ -92,6 +95,8 @@ class UseStep:
             parts.action("Script", "use.script"),
             parts.action("State of this page", "use.state"),
         )
+        if items := beyond_reach(desk):
+            yield parts.messages("warnings", *items)
         yield from running(desk)
         yield parts.controls(
             "pictures",
@@ -174,6 +179,8 @@ def _controller_file(desk: Desk) -> Path:
     controller = controller_of(desk)
     path = desk.place("controller") / "controller.json"
     report: Any = report_of(desk, controller)
+    if not stable(desk, report):
+        raise DataError("the loop is unstable: expected other gains, as Tune finds them")
     if not by_hand(desk):
         report = tuned_of(desk, full=True)
         controller = report.controller
