@@ -120,7 +120,7 @@ def test_a_comma_is_a_decimal_point_and_words_are_no_number(
         page.wait_for_selector(f"text={words} is no number")
     interval.fill("-1")
     interval.press("Enter")
-    page.wait_for_selector("text=dt is -1: expected a number above 0")
+    page.wait_for_selector("text=expected a number above 0; the value before is used")
     interval.fill("0,005")
     interval.press("Enter")
     page.wait_for_selector(".fault", state="detached")

@@ -102,6 +102,20 @@ def test_the_first_stroke_is_slow_from_rest_on(device: DeviceProcess) -> None:
     window.session.close()
 
 
+def test_another_window_sees_the_device_at_rest_again(device: DeviceProcess) -> None:
+    first, second = Window(device), Window(device)
+    first.do("log.stroke")
+    answer, _ = second.do("whole")
+    assert "log.moving" in answer["order"]
+    first.finish()
+    until = time.monotonic() + 20.0
+    while "log.moving" in second.answers[-1][0]["order"]:
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    first.session.close()
+    second.session.close()
+
+
 @pytest.mark.parametrize(
     ("values", "named"), [({"low": -1.0}, "low"), ({"high": 75.1}, "high"), ({"low": 70.0}, "high")]
 )

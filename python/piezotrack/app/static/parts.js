@@ -253,6 +253,8 @@ export function faultAt(main, name, words) {
   if (!words || !name) return false;
   const control = [...main.querySelectorAll("[data-name]")].find((one) => one.dataset.name === name);
   if (!control) return false;
-  faultIn(control, `${words}; the value before is used`);
+  // The value is in the field, in its unit.
+  const short = words.replace(/^\w+ is \S+: (?=expected)/, "");
+  faultIn(control, `${short}; the value before is used`);
   return true;
 }

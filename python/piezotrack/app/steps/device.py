@@ -99,6 +99,9 @@ def first(desk: Desk, step: str) -> list[Part]:
     ]
     page = [limits, *desk.faults("device")]
     if busy:
+        if "device" not in desk.running:
+            # Another window moves it, and says nothing here.
+            desk.changed()
         words = "the device moves; STOP leads it to rest"
         return [*page, parts.messages("moving", parts.message("amber", words))]
     if not stroked:

@@ -47,6 +47,9 @@ POINTS, FRAGILE = 400, 2.0
 PLANE = (-3.2, 1.6, -2.4, 2.4)
 BY_HAND = {"kp": None, "ki": None, "kd": None, "low_pass": None, "notch": None}
 
+# Colours of the gains of the stage.
+COLOURS = {"low": "first", "middle": "plant", "high": "true"}
+
 
 class LoopStep:
     """The loop."""
@@ -354,7 +357,7 @@ def _bode(desk: Desk, report: LoopReport, before: LoopReport | None) -> list[Par
     sizes, phases, planes = [], [], []
     for name, one in report.cases:
         stable = _case(desk, one)[0]
-        role = "unstable" if not stable else {"middle": "plant"}.get(name, "noise")
+        role = COLOURS[name] if stable else "unstable"
         curves = report.response(POINTS, gain=name)
         shown = f"{name} gain" + ("" if stable else ", unstable")
         size = np.maximum(np.abs(curves.open_loop), 1e-12)
@@ -381,7 +384,10 @@ def _bode(desk: Desk, report: LoopReport, before: LoopReport | None) -> list[Par
         if middle.phase_margin is None
         else f"{math.degrees(middle.phase_margin):.3g} degrees"
     )
-    words = f"Gain margin {gain}, phase margin {phase}, Ms {middle.sensitivity:.3g}."
+    words = (
+        f"At the middle gain: gain margin {gain}, phase margin {phase}, "
+        f"Ms {middle.sensitivity:.3g}."
+    )
     return [
         parts.chart(
             "l-bode",
