@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .device import DeviceProcess
     from .parts import Light, Part
 
-__all__ = ["Desk", "Download", "Job", "Purpose", "Same", "Step", "drawing"]
+__all__ = ["Desk", "Download", "Job", "Purpose", "Same", "Step", "drawing", "own_fault"]
 
 # Pictures are drawn by one window at a time.
 drawing = threading.Lock()

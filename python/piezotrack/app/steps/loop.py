@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from ..desk import Desk, Download, Job
     from ..parts import Light, Part
 
-__all__ = ["LoopStep", "controller_lines", "tune_options"]
+__all__ = ["LoopStep", "controller_lines", "stable", "tune_options"]
 
 # Factors about a gain that its slider reaches, and frequencies as shares of the sampling rate.
 AROUND, LOWEST, HIGHEST = 30.0, 1e-3, 0.45

@@ -13,7 +13,9 @@ from .. import parts
 from ..code import call, command
 from ..desk import Download, Same
 from .closed_loop import (
+    by_hand,
     controller_of,
+    known_tuning,
     limits_of,
     model_of,
     noise_of,
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
     from ..desk import Desk
     from ..parts import Light, Part
 
-__all__ = ["MotionStep", "motion_file", "motion_line", "motion_word"]
+__all__ = ["MotionStep", "beyond_reach", "motion_file", "motion_line", "motion_word"]
 
 KINDS = {
     "triangle": "triangle",
@@ -45,10 +47,9 @@ KINDS = {
     "spiral": "spiral, one axis",
     "file": "a file of your own",
 }
+OWN = "A CSV file with columns as time_s and desired_um: drop or choose it"
 # Frequencies of a motion as shares of the sampling rate, and steps.
 SLOWEST, FASTEST, MOST_STEPS = 2e-5, 0.05, 40
-# Rms error as a share of the travel below which a motion is followed well.
-GOOD = 0.01
 NAMES = {"without": "no compensation", "inverse": "inverse", "loop": "inverse and loop"}
 ROLES = {"without": "first", "inverse": "second", "loop": "third"}
 
@@ -160,7 +161,7 @@ def _controls(desk: Desk) -> Part:
     low, high = range_of(desk)
     items = [parts.select("kind", "Motion", state.kind, list(KINDS.items()))]
     if state.kind == "file":
-        items.append(parts.file("motion", "Time and displacement as CSV: drop or choose a file"))
+        items.append(parts.file("motion", OWN))
     else:
         bounds = (reach.low, reach.high)
         spread = 0.1 * (reach.high - reach.low)
@@ -316,7 +317,9 @@ def _table(desk: Desk, runs: Mapping[str, Tracking]) -> Part:
         rows.append((NAMES[name], *errors, *([words] if settled else [])))
     band = f"settled to {100 * desk.state.motion.band:g} % of a step after"
     columns = ("", "rms error", "largest error", *([band] if len(rows[0]) > 3 else []))
-    return parts.table("errors", "Errors after the start", columns, rows)
+    tuned = known_tuning(desk) is not None or by_hand(desk)
+    title = "Errors after the start" + ("" if tuned else "; the loop has yet to be tuned")
+    return parts.table("errors", title, columns, rows)
 
 
 def _csv(desk: Desk, _: Mapping[str, Any]) -> Download:
