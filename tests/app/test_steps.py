@@ -144,6 +144,13 @@ def test_a_column_without_a_unit_is_red_and_a_button_mends_it(
     window.do("whole")
     rail = window.answers[-1][0]["rail"][0]
     assert rail["light"] == "red"
+    # In the words of the page: a person has no arguments to give.
+    (fault,) = window.parts["log.fault"]["items"]
+    assert fault["text"] == "choose the column of the drive above"
+    window.set("log", drive="u")
+    (fault,) = window.parts["log.fault"]["items"]
+    assert fault["text"] == "choose the unit of the drive above"
+    assert [fix["label"] for fix in fault["fixes"]] == ["u is V", "u is mV", "u is kV"]
     window.set("log", drive="u", **{"units.u": "V"})
     window.do("whole")
     assert window.answers[-1][0]["rail"][0]["light"] == "green"

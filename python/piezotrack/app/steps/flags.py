@@ -43,18 +43,51 @@ def key_of(found: LogInfo, title: str) -> str | None:
     return next((key(i, one) for i, one in enumerate(found.columns) if one.title == title), None)
 
 
+def _chosen(state: LogState, found: LogInfo) -> dict[str, str | None]:
+    """Return the columns of the roles, those that were found where none was chosen."""
+    return {role: getattr(state, role) or found.roles.get(role) or None for role in ROLES}
+
+
+def _without_unit(state: LogState, found: LogInfo) -> dict[str, list[tuple[str, str]]]:
+    """Return key and title of the columns of each role that have no unit."""
+    chosen = _chosen(state, found)
+    return {
+        role: [
+            (key(i, one), one.title)
+            for i, one in enumerate(found.columns)
+            if chosen[role] in (one.title, key(i, one))
+            and not (one.unit or state.units.get(key(i, one)))
+        ]
+        for role in ROLES
+    }
+
+
+def to_choose(state: LogState, found: LogInfo) -> str:
+    """Say which columns and units have yet to be chosen; empty where all are."""
+    missing = [
+        f"the column of the {ROLES[role].lower()}"
+        for role, title in _chosen(state, found).items()
+        if title is None and (role != "time" or (state.dt is None and found.time is None))
+    ]
+    missing += [
+        f"the unit of the {ROLES[role].lower()}"
+        for role, columns in _without_unit(state, found).items()
+        if columns
+    ]
+    return f"choose {', '.join(missing)} above" if missing else ""
+
+
 def fixes(state: LogState, found: LogInfo) -> list[Part]:
     """Return buttons for what is probably wrong with a log that is not read."""
-    items = []
-    chosen = {role: getattr(state, role) or found.roles.get(role) for role in ROLES}
-    for role, title in chosen.items():
-        for i, column in enumerate(found.columns):
-            known = key(i, column)
-            if title in (column.title, known) and not (column.unit or state.units.get(known)):
-                items += [
-                    _set(f"{column.title} is {unit}", {"units": {**state.units, known: unit}})
-                    for unit in UNITS[role][:3]
-                ]
+    items = [
+        _set(f"{title} is {unit}", {"units": {**state.units, known: unit}})
+        for role, columns in _without_unit(state, found).items()
+        for known, title in columns
+        for unit in UNITS[role][:3]
+    ]
+    if to_choose(state, found):
+        return items
+    chosen = _chosen(state, found)
     lost = sum(c.missing for c in found.columns if c.title in chosen.values())
     if lost and state.missing is None:
         items.append(_set(f"leave out {lost} missing readings", {"missing": "drop"}))

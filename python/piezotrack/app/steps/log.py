@@ -19,7 +19,7 @@ from .. import parts
 from ..code import call, command, given, plain
 from ..desk import Download, Same
 from .device import RECORDING, recording
-from .flags import MARKED, ROLES, UNITS, fixes, flags, flags_of, key, key_of, places
+from .flags import MARKED, ROLES, UNITS, fixes, flags, flags_of, key, key_of, places, to_choose
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -163,8 +163,9 @@ class LogStep:
             log = record_of(desk)
             part = window_of(desk)
         except PiezotrackError as error:
-            mending = fixes(state, found)
-            return [*page, parts.messages("fault", parts.message("red", str(error), *mending))]
+            words = to_choose(state, found) or str(error)
+            fault = parts.message("red", words, *fixes(state, found))
+            return [*page, parts.messages("fault", fault)]
         return [
             *page,
             flags(desk, found, log, part),

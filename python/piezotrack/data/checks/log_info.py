@@ -376,12 +376,11 @@ def _far(u: Array | None, y: Array | None) -> NDArray[np.bool_] | None:
 
 
 def _attempts(given: Mapping[str, str | int | None]) -> list[dict[str, str | int | None]]:
-    """Return the roles to look for: all, without the displacement, without the drive, the time."""
-    both = ("time", "drive"), ("time", "displacement"), ("time",)
+    """Return the roles to look for: all, two of them, the time; those with what was named first."""
+    fewer = ("time", "drive"), ("time", "displacement"), ("drive", "displacement"), ("time",)
     named = {role for role, key in given.items() if key is not None}
-    return [dict(given)] + [
-        {role: given[role] for role in roles} for roles in both if named <= set(roles)
-    ]
+    ordered = sorted(fewer, key=lambda roles: not named <= set(roles))
+    return [dict(given)] + [{role: given[role] for role in roles} for roles in ordered]
 
 
 def _signals(
