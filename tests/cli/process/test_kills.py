@@ -101,7 +101,7 @@ def wait_for_writing(process: subprocess.Popen[bytes], out: str) -> None:
 
 
 def whole(work: list[str], seed: int) -> tuple[dict[str, bytes], float]:
-    """What a command writes, and for how long it writes [s]."""
+    """Return the content that a command writes, and for how long it writes [s]."""
     out = f"whole{seed}"
     with start(work, out, seed) as process:
         wait_for_writing(process, out)
