@@ -131,6 +131,9 @@ class LogStep:
             "",
             parts.file("log", OPENING),
         )
+        example = parts.buttons(
+            "example", parts.action("Take the measured example", "log.example", primary=True)
+        )
         if not state.source:
             return [
                 parts.text(
@@ -143,10 +146,7 @@ class LogStep:
                     "is read by it.",
                 ),
                 opening,
-                parts.buttons(
-                    "example",
-                    parts.action("Take the measured example", "log.example", primary=True),
-                ),
+                example,
                 *recording(desk),
             ]
         page = [opening, *recording(desk)]
@@ -156,7 +156,7 @@ class LogStep:
             return [
                 *page,
                 parts.messages("fault", parts.message("red", str(error))),
-                parts.buttons("example", parts.action("Take the measured example", "log.example")),
+                example,
             ]
         page.append(_columns(state, found))
         try:
