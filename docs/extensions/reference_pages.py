@@ -32,6 +32,7 @@ ROOMS = (
     "stages",
     "references",
     "hardware",
+    "response",
     "control",
     "xu_li_2010",
 )

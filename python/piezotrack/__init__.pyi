@@ -6,6 +6,7 @@ from . import data as data
 from . import hardware as hardware
 from . import identification as identification
 from . import references as references
+from . import response as response
 from . import stages as stages
 from . import xu_li_2010 as xu_li_2010
 from ._core import __version__ as __version__
@@ -69,6 +70,10 @@ from .references.waveforms import sine as sine
 from .references.waveforms import staircase as staircase
 from .references.waveforms import triangle as triangle
 from .references.xy_reference import XYReference as XYReference
+from .response.excitation import RandomPhaseMultisine as RandomPhaseMultisine
+from .response.frequency_response import FrequencyResponse as FrequencyResponse
+from .response.measuring import frequency_response as frequency_response
+from .response.response_file import load_response as load_response
 from .stages.feedback.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.feedback.dahl import DahlStage as DahlStage
 from .stages.feedback.first_order_dahl import FirstOrderDahlStage as FirstOrderDahlStage

@@ -94,6 +94,7 @@ TABLE = """
 --repetitive      -                                         Repetitive control
 --report          FILE                                      Report for other readers
 --resample        TIME                                      Interpolate to this interval
+--resolution      FREQUENCY                                 Distance of the frequencies
 --rest            VOLTAGE                                   Drive before and after
 --runs            N                                         Independent searches
 --scale           NAME=linear|log                           Scale of the search
@@ -135,6 +136,7 @@ ARGUMENTS = {
     "CONTROLLER",
     "REFERENCE",
     "DRIVE",
+    "EXCITATION|FILE",
     "PROTOCOL",
     "[MODEL_X|CONTROLLER_X [MODEL_Y|CONTROLLER_Y]] PATH",
 }

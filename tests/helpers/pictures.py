@@ -86,6 +86,11 @@ def traced() -> pt.control.Contour:
     return pt.contour(pt.XYStage.xu_li_2010(seed=1), (loop(), loop()), path)
 
 
+def response() -> pt.FrequencyResponse:
+    lines = pt.RandomPhaseMultisine(band=(4.0, 400.0), low=30.0, high=45.0)
+    return pt.frequency_response(plays(), lines, rate=2000.0)
+
+
 def campaign() -> pt.identification.Campaign:
     """Four records: three seeds of a search, and least squares."""
     records = {f"record {i}": log()[3.0 : 4.5 + 0.1 * i] for i in range(4)}
@@ -157,6 +162,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "ControllerComparison": compared,
     "Dataset": log,
     "DeviceTracking": on_device,
+    "FrequencyResponse": response,
     "Health": lambda: pt.watch(model_watched(), watched(31)),
     "Identification": searched,
     "Identification, plays": fit,

@@ -22,7 +22,7 @@ HEADINGS = {
     "data": ("info", "convert", "noise"),
     "identify": ("identify", "compare", "step", "campaign", "watch", "suggest"),
     "control": ("simulate", "feedforward", "track", "tune", "learn", "contour", "export"),
-    "device": ("measure", "play", "serve"),
+    "device": ("measure", "response", "play", "serve"),
     "app": ("app",),
     "research": ("demo", "compare-controllers", "benchmark", "reproduce"),
 }

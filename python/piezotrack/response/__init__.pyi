@@ -1,0 +1,6 @@
+# The public names and their homes, each written once: type checkers read them here, and
+# _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
+from .excitation import RandomPhaseMultisine as RandomPhaseMultisine
+from .frequency_response import FrequencyResponse as FrequencyResponse
+from .measuring import frequency_response as frequency_response
+from .response_file import load_response as load_response

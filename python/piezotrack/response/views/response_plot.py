@@ -1,0 +1,118 @@
+"""Pictures of a frequency response: Bode and Nyquist, with the band of 95 %."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..._support.display.plot_style import (
+    ACTUAL,
+    BAND,
+    ERROR,
+    GUIDE,
+    REPETITIVE,
+    axes_or_new,
+    caption,
+    drawing,
+    heading,
+    legend_inside,
+    literal,
+    share,
+    sheet,
+    whole,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure, SubFigure
+    from numpy.typing import NDArray
+
+    from ..frequency_response import FrequencyResponse
+
+    Array = NDArray[np.float64]
+
+__all__ = ["plot_frequency_response", "plot_magnitude", "plot_nyquist", "plot_phase"]
+
+RESPONSE: dict[str, Any] = {**ACTUAL, "label": "response", "linewidth": 1.2}
+REGION: dict[str, Any] = {**BAND, "label": "band of 95 %"}
+# Points of the outline of a region, and most regions drawn.
+OUTLINE, MOST_REGIONS = 24, 400
+
+
+@drawing
+def plot_magnitude(response: FrequencyResponse, ax: Axes | None = None) -> Axes:
+    """Draw the magnitude with its band, and the standard deviations of noise and distortion."""
+    (ax,) = axes_or_new(ax, 1)
+    unit, scale = response.shown_unit
+    f, size, band = response.frequency, response.magnitude, response.band()
+    # Where the band reaches 0 a logarithmic axis has no end for it.
+    low = np.maximum(size - band, 1e-3 * size)
+    ax.fill_between(f, scale * low, scale * (size + band), **REGION)
+    ax.loglog(f, scale * size, **RESPONSE)
+    if response.noise is not None:
+        noise = {**ERROR, "label": "noise", "linestyle": ":"}
+        ax.loglog(f, scale * np.sqrt(response.noise), **noise)
+    if response.distortion is not None:
+        # Lines at which noise alone explains the variance have none.
+        distortion = np.sqrt(np.where(response.distortion > 0.0, response.distortion, np.nan))
+        dots = {**REPETITIVE, "linestyle": "none", "marker": ".", "markersize": 3.0}
+        ax.loglog(f, scale * distortion, **{**dots, "label": "nonlinear distortion"})
+    lowest = size if response.noise is None else np.minimum(size, np.sqrt(response.noise))
+    ax.set(xlabel="frequency [Hz]", ylabel=f"magnitude [{unit}]")
+    if (lowest := lowest[lowest > 0.0]).size:
+        ax.set_ylim(bottom=0.3 * scale * lowest.min())
+    ax.margins(x=0)
+    legend_inside(ax, ncols=2)
+    heading(ax, literal(response.source) if response.source else "Frequency response")
+    return ax
+
+
+@drawing
+def plot_phase(response: FrequencyResponse, ax: Axes | None = None) -> Axes:
+    """Draw the phase with its band."""
+    (ax,) = axes_or_new(ax, 1)
+    f, phase = response.frequency, response.phase
+    turn = np.arcsin(np.minimum(1.0, response.band() / response.magnitude))
+    low, high = (np.degrees(phase + sign * turn) for sign in (-1.0, 1.0))
+    ax.fill_between(f, low, high, **REGION)
+    ax.semilogx(f, np.degrees(phase), **RESPONSE)
+    ax.set(xlabel="frequency [Hz]", ylabel="phase [deg]")
+    ax.margins(x=0)
+    return ax
+
+
+@drawing
+def plot_nyquist(response: FrequencyResponse, ax: Axes | None = None) -> Axes:
+    """Draw the response in the complex plane, with the region of 95 % about each line."""
+    from matplotlib.collections import PolyCollection
+
+    (ax,) = axes_or_new(ax, 1)
+    unit, scale = response.shown_unit
+    value, band = scale * response.value, scale * response.band()
+    kept = np.arange(0, value.size, max(1, value.size // MOST_REGIONS))
+    outline = np.exp(2j * np.pi * np.arange(OUTLINE) / OUTLINE)
+    regions = value[kept, np.newaxis] + band[kept, np.newaxis] * outline
+    corners = np.stack([regions.real, regions.imag], axis=-1)
+    ax.add_collection(PolyCollection(list(corners), **{**REGION, "label": None}))
+    ax.plot(value.real, value.imag, **RESPONSE)
+    ax.axhline(0.0, **GUIDE)
+    ax.axvline(0.0, **GUIDE)
+    ax.set(xlabel=f"real part [{unit}]", ylabel=f"imaginary part [{unit}]", aspect="equal")
+    ax.set_adjustable("datalim")
+    return ax
+
+
+@drawing
+def plot_frequency_response(
+    response: FrequencyResponse, fig: Figure | SubFigure | None = None
+) -> Figure:
+    """Plot magnitude and phase over frequency, and the response in the complex plane."""
+    rows = (("magnitude", "nyquist"), ("phase", "nyquist"))
+    figure, axes = sheet(fig, (11.0, 5.6), rows, heights=(3.0, 2.0), widths=(3.0, 2.0))
+    plot_magnitude(response, axes["magnitude"])
+    plot_phase(response, axes["phase"])
+    plot_nyquist(response, axes["nyquist"])
+    share(axes["phase"], axes["magnitude"])
+    caption(figure, f"{response.excitation}", "medium")
+    return whole(figure)
