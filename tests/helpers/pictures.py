@@ -86,7 +86,7 @@ def traced() -> pt.control.Contour:
     return pt.contour(pt.XYStage.xu_li_2010(seed=1), (loop(), loop()), path)
 
 
-def response() -> pt.FrequencyResponse:
+def measured_response() -> pt.FrequencyResponse:
     lines = pt.RandomPhaseMultisine(band=(4.0, 400.0), low=30.0, high=45.0)
     return pt.frequency_response(plays(), lines, rate=2000.0)
 
@@ -162,7 +162,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "ControllerComparison": compared,
     "Dataset": log,
     "DeviceTracking": on_device,
-    "FrequencyResponse": response,
+    "FrequencyResponse": measured_response,
     "Health": lambda: pt.watch(model_watched(), watched(31)),
     "Identification": searched,
     "Identification, plays": fit,
@@ -170,6 +170,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "IdentifiedModel": stored,
     "Learning": learnt,
     "LoopReport": lambda: pt.check_loop(stage(), loop(repetitive=True)),
+    "ModalFit": lambda: pt.fit_modes(measured_response()),
     "ModelViews": stored,
     "Noise": lambda: pt.identification.identify_noise(stage().record(np.zeros(5000), 2e-4)),
     "PredictionBand": lambda: fit().prediction_band(log()),

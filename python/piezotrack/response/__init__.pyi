@@ -3,4 +3,6 @@
 from .excitation import RandomPhaseMultisine as RandomPhaseMultisine
 from .frequency_response import FrequencyResponse as FrequencyResponse
 from .measuring import frequency_response as frequency_response
+from .modal_fit import ModalFit as ModalFit
+from .modal_fit import fit_modes as fit_modes
 from .response_file import load_response as load_response

@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _core
 from .._core import Stage as CoreStage
-from .._support.arguments import as_numbers, one_or_more_numbers
+from .._support.arguments import as_numbers, finite, one_or_more_numbers, positive
 from ..errors import ParameterError
 from .inverse import Inverse
 from .model_info import LISTED, ModelInfo
@@ -37,6 +37,8 @@ __all__ = [
 
 # Longest simulation step of a model's mechanics between the steps of a held voltage [s].
 MODEL_STEP = 5e-5
+# Samples of a period of a describing function.
+SINE_SAMPLES = 2000
 # Parameter, symbol, value and unit.
 Ratio = tuple[str, str, float, str]
 Method = Literal["exponential", "rk4", "rk45"]
@@ -192,6 +194,58 @@ class Stage:
         True
         """
         return self._simulate(u, dt, hold, initial, "exponential", accuracy)
+
+    def describing_function(
+        self, amplitude: ArrayLike, frequency: float, *, offset: float = 0.0
+    ) -> NDArray[np.complex128]:
+        r"""Return the gain and the phase of the fundamental of a driven sine.
+
+        .. math:: N(A) = \frac{2 i}{A T} \int_0^T x(t) \, e^{-i \omega t} \, dt
+            \quad \text{for} \quad u = u_0 + A \sin \omega t
+
+        in the third period, by simulation. Hysteresis makes both depend on the amplitude; Gelb and
+        Vander Velde, Multiple-Input Describing Functions, 1968, section 2.2.
+
+        Parameters
+        ----------
+        amplitude : float or array_like, shape (n,)
+            A [V].
+        frequency : float
+            Of the sine [Hz].
+        offset : float, optional
+            u0 [V], where the stage has gone slowly from rest.
+
+        Returns
+        -------
+        ndarray of complex, of the shape of `amplitude`
+            Displacement over drive [m/V].
+
+        Raises
+        ------
+        ParameterError
+            An amplitude or the frequency is not above 0.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> stage = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(1e-6,))
+        >>> gains = stage.describing_function([1.0, 50.0], 1.0, offset=30.0)
+        >>> [f"{1e6 * abs(gain):.2f} um/V" for gain in gains]
+        ['1.00 um/V', '1.95 um/V']
+        """
+        w = 2.0 * np.pi * positive("frequency", frequency, "Hz")
+        start = self.equilibrium((0.0, finite("offset", offset, "V")))
+        t = np.arange(3 * SINE_SAMPLES + 1) * (2.0 * np.pi / w / SINE_SAMPLES)
+        turn = np.exp(-1j * w * t[-SINE_SAMPLES:])
+
+        def at(size: float) -> complex:
+            volts = positive("amplitude", size, "V") * np.sin(w * t)
+            moved = self.simulate(offset + volts, float(t[1]), initial=start).x
+            return complex(2j * (moved[-SINE_SAMPLES:] @ turn) / SINE_SAMPLES / size)
+
+        sizes = np.asarray(amplitude, dtype=np.float64)
+        found = np.array([at(float(size)) for size in sizes.ravel()], dtype=np.complex128)
+        return found.reshape(sizes.shape)
 
     def equilibrium(self, voltages: float | Sequence[float]) -> Any:
         """State in equilibrium after a slow visit to each voltage in turn, from never moved.

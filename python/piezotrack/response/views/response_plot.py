@@ -9,6 +9,7 @@ import numpy as np
 from ..._support.display.plot_style import (
     ACTUAL,
     BAND,
+    DESIRED,
     ERROR,
     GUIDE,
     REPETITIVE,
@@ -29,10 +30,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..frequency_response import FrequencyResponse
+    from ..modal_fit import ModalFit
 
     Array = NDArray[np.float64]
 
-__all__ = ["plot_frequency_response", "plot_magnitude", "plot_nyquist", "plot_phase"]
+__all__ = [
+    "plot_frequency_response",
+    "plot_magnitude",
+    "plot_modal_fit",
+    "plot_nyquist",
+    "plot_phase",
+]
 
 RESPONSE: dict[str, Any] = {**ACTUAL, "label": "response", "linewidth": 1.2}
 REGION: dict[str, Any] = {**BAND, "label": "band of 95 %"}
@@ -116,3 +124,20 @@ def plot_frequency_response(
     share(axes["phase"], axes["magnitude"])
     caption(figure, f"{response.excitation}", "medium")
     return whole(figure)
+
+
+@drawing
+def plot_modal_fit(fit: ModalFit, fig: Figure | SubFigure | None = None) -> Figure:
+    """Plot a response with the fitted modes over it."""
+    figure = plot_frequency_response(fit.response, fig)
+    magnitude, nyquist, phase = (figure.axes[k] for k in range(3))
+    _, scale = fit.response.shown_unit
+    f, fitted = fit.response.frequency, fit.fitted
+    modes = {**DESIRED, "label": "modes and delay"}
+    magnitude.plot(f, scale * np.abs(fitted), **modes)
+    legend_inside(magnitude, ncols=2)
+    turn = np.unwrap(np.angle(fitted))
+    turn += 2.0 * np.pi * np.round((fit.response.phase[0] - turn[0]) / (2.0 * np.pi))
+    phase.plot(f, np.degrees(turn), **modes)
+    nyquist.plot(scale * fitted.real, scale * fitted.imag, **modes)
+    return figure
