@@ -6,10 +6,12 @@ import math
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 from ...references.reference import Reference
+from ...response.frequency_response import FrequencyResponse
 from ..loop.contouring import contour
 from ..loop.stability import check_loop
 from ..running.track import track
 from .goal import MINIMISED
+from .measured_response import tune_on_response
 from .model_set.other_kind import tried_on_other_kind
 from .problem import TuningProblem
 from .refusal import refusal
@@ -55,7 +57,11 @@ class TuneOptions(TypedDict, total=False):
 
 
 def tune(
-    stage: Plant | IdentifiedModel | Sequence[Plant | IdentifiedModel] | XYStage,
+    stage: Plant
+    | IdentifiedModel
+    | Sequence[Plant | IdentifiedModel]
+    | XYStage
+    | FrequencyResponse,
     reference: Reference
     | XYReference
     | str
@@ -101,10 +107,11 @@ def tune(
 
     Parameters
     ----------
-    stage : Stage, VirtualStage, IdentifiedModel, or a sequence of them; or XYStage
+    stage : Stage, VirtualStage, IdentifiedModel, or a sequence of them; XYStage; FrequencyResponse
         All are simulated, from the zero of the first and with its feedforward, and the margins hold
         for all. The first has no noise and no amplifier where it is a model: ``pt.VirtualStage.of``
-        gives it both. Other models have those of the first.
+        gives it both. Other models have those of the first. Of a response the modes fitted to it
+        are the stage, and the sensitivity holds at each of its lines, within its band.
     reference : Reference, str or sequence of them, optional
         Motions along which the error counts; of an XY stage paths, as ``pt.circle(...)``. A text or
         a file is taken as by the command line: ``"triangle:1Hz,5..42um"``.
@@ -163,6 +170,28 @@ def tune(
     >>> tuned.kept[-1].name, tuned.kept[-1].value < 2.01
     ('sensitivity', True)
     """
+    if isinstance(stage, FrequencyResponse):
+        return tune_on_response(
+            stage,
+            lambda fitted, interval, kept: tune(
+                fitted,
+                reference,
+                dt=interval,
+                limits=limits,
+                feedforward=feedforward,
+                law=law,
+                parts=parts,
+                filters=filters,
+                margins=kept,
+                spread=spread,
+                goal=goal,
+                timing=timing,
+                search=search,
+                threads=threads,
+            ),
+            dt,
+            margins,
+        )
     problem = TuningProblem.checked(
         stage=stage,
         reference=reference,
