@@ -34,6 +34,7 @@ from .control.tuning.margins import Margins as Margins
 from .control.tuning.margins import Spread as Spread
 from .control.tuning.schedule import schedule as schedule
 from .control.tuning.tune import tune as tune
+from .control.verifying.verify import verify as verify
 from .data import datasets as datasets
 from .data.dataset import Dataset as Dataset
 from .data.reader import read as read

@@ -62,6 +62,7 @@ TABLE = """
 --kq              GAIN                                      Learning gain of the repetitive control
 --lag             TIME                                      from sampling x to sampling y
 --largest-error   LENGTH                                    Largest rms error
+--level           LENGTH                                    Displacement that the loop holds
 --limits          LOW:HIGH                                  Lowest and highest drive
 --list            FILE                                      List of logs
 --method          descents|swarm|xu-li-2010|spso-2011       Search
@@ -95,6 +96,7 @@ TABLE = """
 --report          FILE                                      Report for other readers
 --resample        TIME                                      Interpolate to this interval
 --resolution      FREQUENCY                                 Distance of the frequencies
+--response        FILE                                      Response of which
 --rest            VOLTAGE                                   Drive before and after
 --runs            N                                         Independent searches
 --scale           NAME=linear|log                           Scale of the search
@@ -133,9 +135,11 @@ ARGUMENTS = {
     "OUT",
     "MODEL",
     "MODEL|CONTROLLER",
+    "MODEL|RESPONSE",
     "CONTROLLER",
     "REFERENCE",
     "DRIVE",
+    "EXCITATION",
     "EXCITATION|FILE",
     "PROTOCOL",
     "[MODEL_X|CONTROLLER_X [MODEL_Y|CONTROLLER_Y]] PATH",

@@ -91,6 +91,14 @@ def measured_response() -> pt.FrequencyResponse:
     return pt.frequency_response(plays(), lines, rate=2000.0)
 
 
+def verified() -> pt.control.Verification:
+    lines = pt.RandomPhaseMultisine(band=(5.0, 400.0), low=-1.0, high=1.0)
+    law = pt.Pid(kp=5e3, ti=5e-5, td=0.02)
+    return pt.verify(
+        plays(), pt.Controller(dt=1e-3, limits=LIMITS, feedback=law), lines, level=30 * UM
+    )
+
+
 def campaign() -> pt.identification.Campaign:
     """Four records: three seeds of a search, and least squares."""
     records = {f"record {i}": log()[3.0 : 4.5 + 0.1 * i] for i in range(4)}
@@ -184,6 +192,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Table2": table_2,
     "Tracking": tracked,
     "Tuned": tuned,
+    "Verification": verified,
 }
 SLOW = ("Reproduction",)
 

@@ -21,7 +21,7 @@ __all__ = ["COMMANDS", "app", "run"]
 HEADINGS = {
     "data": ("info", "convert", "noise"),
     "identify": ("identify", "compare", "step", "campaign", "watch", "suggest"),
-    "control": ("simulate", "feedforward", "track", "tune", "learn", "contour", "export"),
+    "control": ("simulate", "feedforward", "track", "tune", "verify", "learn", "contour", "export"),
     "device": ("measure", "response", "play", "serve"),
     "app": ("app",),
     "research": ("demo", "compare-controllers", "benchmark", "reproduce"),

@@ -64,3 +64,5 @@ from .tuning.schedule import schedule as schedule
 from .tuning.tune import tune as tune
 from .tuning.tuned import MarginReport as MarginReport
 from .tuning.tuned import Tuned as Tuned
+from .verifying.verification import Verification as Verification
+from .verifying.verify import verify as verify

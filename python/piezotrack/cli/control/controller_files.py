@@ -11,10 +11,11 @@ from .loop_options import PAPER, check_same_drive, known_model
 if TYPE_CHECKING:
     from ...control.controller.controller import Controller
     from ...identification.fitted.identified_model import IdentifiedModel
+    from ...response.frequency_response import FrequencyResponse
     from ...stages.virtual import VirtualStage
     from .loop_options import Simulation
 
-__all__ = ["controller_in", "only_controller", "stage_of_controller"]
+__all__ = ["controller_in", "only_controller", "response_in", "stage_of_controller"]
 
 
 def controller_in(file: Path) -> Controller | None:
@@ -27,6 +28,18 @@ def controller_in(file: Path) -> Controller | None:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         return None
     return load_controller(file)
+
+
+def response_in(file: Path) -> FrequencyResponse | None:
+    """Load a frequency response, or return None where the file is another."""
+    from ...identification.fitted.model_file import read_content
+    from ...response.frequency_response import FORMAT
+    from ...response.response_file import load_response
+
+    _, document = read_content(file)
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        return None
+    return load_response(file)
 
 
 def only_controller(file: Path, remedy: str) -> Controller:

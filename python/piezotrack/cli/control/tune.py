@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 from ...errors import ParameterError
-from ..command import Argument, Option, command
+from ..command import Argument, Option, command, refuse_without_effect
 from ..option_groups import Motion
-from ..options import ModelFile, Sensitivity, Zero
+from ..options import Sensitivity, Zero
 from ..output import Output
 from ..values import DECIBELS, DEGREES, LENGTH, LOOP_TIME, PERCENT
+from .controller_files import response_in
 from .loop_options import PAPER, LoopOptions, Simulation, Stage, known_model, zero_words
 
 __all__ = ["tune_command"]
@@ -18,7 +20,9 @@ __all__ = ["tune_command"]
 
 @command()
 def tune_command(
-    model: ModelFile,
+    model: Annotated[
+        Path, Argument("Model file, or response file, as `response` writes it", "MODEL|RESPONSE")
+    ],
     references: Annotated[
         list[str] | None,
         Argument(
@@ -90,17 +94,26 @@ def tune_command(
         raise ParameterError("--largest-error", f"{1e9 * largest_error:g} nm", "an error above 0")
     own = stage != PAPER
     simulation.check(own=own, searched=True)
-    known = known_model(model, zero=zero, paper=not own)
     desired = [motion.of(text) for text in references or ()]
     pictures = [name for i in range(len(desired)) for name in picture_files(picture_name(i))]
     output.will_write(["controller.json", "tuning.json", *pictures])
-    plant = simulation.stage(stage, known)
+    if (response := response_in(model)) is not None:
+        refuse_without_effect(OF_A_MODEL, "with a response file")
+        stages: Any = response
+        dt, limits, inverse, zeroed = loop.dt, loop.limits, None, ""
+    else:
+        known = known_model(model, zero=zero, paper=not own)
+        plant = simulation.stage(stage, known)
+        stages = [plant] if stage in (None, PAPER) else [plant, known]
+        dt = loop.interval(known, desired[0] if desired else None, own=own)
+        limits = loop.volts(known, own=own)
+        inverse, zeroed = known.inverse() if feedforward else None, zero_words(known)
     tuned = tune(
-        [plant] if stage in (None, PAPER) else [plant, known],
+        stages,
         desired or None,
-        dt=loop.interval(known, desired[0] if desired else None, own=own),
-        limits=loop.volts(known, own=own),
-        feedforward=known.inverse() if feedforward else None,
+        dt=dt,
+        limits=limits,
+        feedforward=inverse,
         parts=None if parts is None else [one.strip() for one in parts.split(",")],
         margins=Margins(
             gain=10.0 ** (gain_margin / 20.0),
@@ -116,8 +129,12 @@ def tune_command(
         timing=simulation.timing,
         search=TuningSearch(seed=simulation.seed),
     )
-    words = f"stage: {stage or model.name}{zero_words(known)}\n{tuned}"
+    words = f"stage: {stage or model.name}{zeroed}\n{tuned}"
     output.show(words, tuned.document(), output.write(tuned.save, "controller.json"))
+
+
+# Options of a model, which a response is not.
+OF_A_MODEL = ("stage", "feedforward", "zero", "noise", "bandwidth", "rate", "dt")
 
 
 def _within(option: str, value: float, low: float, high: float, expected: str) -> None:

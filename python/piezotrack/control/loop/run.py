@@ -6,17 +6,22 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from ...stages.inverse import PlayedVoltage
 from .closed_loop import run_closed_loop
 from .preconditions import check_period, check_stable, check_within_reach
 from .tracking import Tracking, feedforward_of
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ... import _core
     from ...references.reference import Reference, SampledReference
-    from ...stages.inverse import PlayedVoltage
     from ...stages.virtual import VirtualStage
     from ..controller.controller import Controller
     from ..timing import Timing
+
+    Array = NDArray[np.float64]
 
 __all__ = ["Run"]
 
@@ -31,10 +36,13 @@ class Run:
         The controller.
     reference : Reference
         The reference.
+    injected : ndarray or None, shape (n,)
+        Voltage that is added to the feedforward at the samples [V].
     """
 
     controller: Controller
     reference: Reference
+    injected: Array | None = None
 
     @cached_property
     def samples(self) -> SampledReference:
@@ -44,7 +52,10 @@ class Run:
     @cached_property
     def feedforward(self) -> PlayedVoltage:
         """Feedforward of the whole run [V], and a note of how it was computed."""
-        return feedforward_of(self.controller, self.reference, self.samples)
+        volts, note = feedforward_of(self.controller, self.reference, self.samples)
+        if self.injected is None:
+            return PlayedVoltage(volts, note)
+        return PlayedVoltage(volts + self.injected, f"{note}, with a voltage injected")
 
     def check(
         self, plant: VirtualStage, delay: float, *, unstable: bool = False, beyond_reach: bool

@@ -116,6 +116,7 @@ def track_on(
     shift: float = 0.0,
     beyond_reach: bool = False,
     unstable: bool = False,
+    injected: Array | None = None,
 ) -> DeviceTracking:
     """Close the loop of a controller on a device; `pt.track` calls it for a device.
 
@@ -130,6 +131,8 @@ def track_on(
         Voltage before and after [V]; default 0 V, or the limit nearest to it.
     shift : float, optional
         What is subtracted from every reading [m].
+    injected : ndarray, shape (n,), optional
+        Voltage that is added to the feedforward at the samples [V].
 
     Returns
     -------
@@ -157,7 +160,7 @@ def track_on(
         )
     home = rest_of(device, safe)
     check_period(controller, reference)
-    planned = Run(controller, reference)
+    planned = Run(controller, reference, injected)
     volts, note = planned.feedforward
     log = _Log(planned)
     with terminated(), _safe_after(device, home, log):

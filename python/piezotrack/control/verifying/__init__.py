@@ -1,0 +1,1 @@
+"""Verification of a loop: its sensitivity measured beside the one predicted."""
