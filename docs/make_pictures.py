@@ -1,8 +1,8 @@
 """Draw the pictures of the pages that no example draws: what the code of the pages plots.
 
-Run as ``make pictures``, or ``python docs/make_pictures.py``: band.png, profiles.png, suggested.png
-and identified.png beside this file. The others are drawn by scripts in python/examples and benches,
-and by ``piezotrack demo`` and ``make benchmark``.
+Run as ``make pictures``, or ``python docs/make_pictures.py``: band.png, profiles.png,
+suggested.png, identified.png, response.png and verified.png beside this file. The others are drawn
+by scripts in python/examples and benches, and by ``piezotrack demo`` and ``make benchmark``.
 """
 
 from __future__ import annotations
@@ -55,6 +55,21 @@ def identified() -> None:
     pt.identify(pt.datasets.dbo_training()[3.0:23.0]).plot().savefig(DOCS / "identified.png")
 
 
+def responded() -> None:
+    """Draw a measured response, and the sensitivity of the loop that is tuned on it."""
+    plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(0.5, 2.0), weights=(2e-7, 1e-7))
+    stage = pt.VirtualStage.of(
+        plays, mode=(160.0, 0.05), delay=2e-4, noise=5e-9, limits=(0.0, 75.0)
+    )
+    lines = pt.RandomPhaseMultisine(band=(4.0, 900.0), low=28.0, high=32.0)
+    response = pt.frequency_response(stage, lines, rate=2000.0)
+    response.plot().savefig(DOCS / "response.png")
+    tuned = pt.tune(response, limits=(0.0, 75.0), parts="pid")
+    added = pt.RandomPhaseMultisine(band=(4.0, 900.0), low=-1.0, high=1.0, realisations=12)
+    found = pt.verify(stage, tuned.controller, added, level=30e-6, model=response)
+    found.plot().savefig(DOCS / "verified.png")
+
+
 if __name__ == "__main__":
-    for draw in (band, profiles, suggested, identified):
+    for draw in (band, profiles, suggested, identified, responded):
         draw()

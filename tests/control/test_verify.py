@@ -11,7 +11,7 @@ import pytest
 
 import piezotrack as pt
 from commands import run
-from piezotrack.control.on_device import closed_loop
+from piezotrack.control.on_device import closed_loop, latency
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -170,3 +170,38 @@ def test_the_command_writes_what_it_found(tmp_path: Path) -> None:
         failed = run(*words, *wrong, "-o", str(tmp_path / "other"))
         assert failed.exit_code != 0
         assert named in failed.stderr
+
+
+@pytest.mark.slow
+def test_from_a_response_to_a_verified_loop_on_a_gcs_controller(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # The machine of a test is busy.
+    monkeypatch.setattr(latency, "MOST", 1e3)
+    monkeypatch.setattr("piezotrack.control.verifying.verify.MOST_LATE", 0.1)
+    plays = pt.PrandtlIshlinskiiStage(
+        linear=1e-6, thresholds=(0.5, 2.0), weights=(2e-7, 1e-7), time_constant=5e-3
+    )
+    server = pt.hardware.GcsServer(pt.VirtualStage.of(plays, noise=5e-9, limits=LIMITS))
+    with server:
+        device = pt.hardware.connect(server.address)
+        lines = pt.RandomPhaseMultisine(
+            band=(0.5, 22.0), low=28.0, high=32.0, realisations=3, periods=2
+        )
+        response = pt.frequency_response(device, lines, rate=50.0)
+        tuned = pt.tune(response, limits=LIMITS, parts="pid")
+        added = replace(lines, low=-1.0, high=1.0, realisations=4)
+        found = pt.verify(device, tuned.controller, added, level=30e-6, model=response)
+        assert found.verdict != "fails"
+        # The plant in the loop is that which was measured, at another amplitude.
+        alike = np.abs(found.plant.value - response.value) / response.magnitude
+        assert np.median(alike) < 0.1
+        assert np.median(np.abs(found.feedback.value / _law(tuned.controller, found) - 1.0)) < 0.1
+        device.close()
+
+
+def _law(loop: pt.Controller, found: pt.control.Verification) -> Any:
+    """Compute the PID at the lines."""
+    law, q = loop.feedback, 1.0 - np.exp(-2j * np.pi * found.sensitivity.frequency * loop.dt)
+    assert isinstance(law, pt.Pid)
+    return law.kp * (1.0 + loop.dt / law.ti / q + law.td / loop.dt * q)

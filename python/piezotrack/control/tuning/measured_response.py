@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 __all__ = ["controller_response", "tune_on_response", "worst_sensitivity"]
 
 # Searches with tighter margins, and the largest sensitivity below which no gains are left.
-ATTEMPTS, LEAST = 5, 1.05
+ATTEMPTS, LEAST = 6, 1.05
+# Factor on what the distance of the open loop from -1 is too short: few searches are needed.
+BEYOND = 1.2
 
 
 def tune_on_response(
@@ -75,7 +77,8 @@ def tune_on_response(
             kept = MarginReport("measured sensitivity", value, wanted.sensitivity, at)
             return replace(tuned, kept=(*tuned.kept, kept), margins=wanted)
         # By as much as the distance of the open loop from -1 is too short.
-        distance = 1.0 / tightened.sensitivity + 1.0 / wanted.sensitivity - 1.0 / value
+        short = 1.0 / wanted.sensitivity - 1.0 / value
+        distance = 1.0 / tightened.sensitivity + BEYOND * short
         if distance >= 1.0 / LEAST:
             break
         tightened = replace(tightened, sensitivity=1.0 / distance)
