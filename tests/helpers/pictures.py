@@ -214,7 +214,15 @@ def before_and_after(**look: Any) -> Any:
 
 
 # Pictures that are no method of a class, by the functions that draw them.
+def amplitudes(**look: Any) -> Any:
+    sizes = (1.0, 10.0)
+    lines = [pt.RandomPhaseMultisine(band=(4.0, 40.0), low=30.0 - a, high=30.0 + a) for a in sizes]
+    responses = [pt.frequency_response(PLAYS, one, rate=1000.0) for one in lines]
+    return pt.response.plot_amplitudes(responses, 4.0, model=PLAYS, **look)
+
+
 FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "plot_amplitudes": amplitudes,
     "plot_response": response,
     "plot_feedforward": feedforward,
     "plot_before_and_after": before_and_after,

@@ -120,3 +120,26 @@ def test_the_describing_function_of_a_mode_is_its_response() -> None:
     # The third period holds what is left of the transient.
     assert np.abs(found / truth - 1.0)[0] < 1e-3
     assert (np.abs(found / truth - 1.0) < 3.0 * np.exp(-late) + 1e-3).all()
+
+
+def test_a_response_lies_on_the_describing_function_where_one_line_moves_the_stage() -> None:
+    # Nearly a sine: the other lines are weak.
+    plays = pt.PrandtlIshlinskiiStage(
+        linear=1e-6, thresholds=(0.5, 2.0, 6.0), weights=(2e-7, 1e-7, 2e-7)
+    )
+    for size in (0.3, 3.0, 20.0):
+        lines = pt.RandomPhaseMultisine(
+            band=(4.0, 40.0), low=30.0 - size, high=30.0 + size, shape=[(4.0, 1.0), (8.0, 1e-3)]
+        )
+        found = pt.frequency_response(plays, lines, rate=RATE)
+        late = np.exp(-2j * np.pi * 4.0 / RATE)
+        truth = plays.describing_function(np.sqrt(2.0) * found.amplitude, 4.0, offset=30.0) * late
+        assert found.value[0] == pytest.approx(truth, rel=0.01)
+
+
+def test_the_modes_are_dynamics_of_a_stage_that_a_slow_log_identified() -> None:
+    slow = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(2e-7,))
+    found = pt.fit_modes(measured(SEVERAL, noise=5e-9))
+    fast = replace(slow, **found.dynamics)
+    assert fast.mode_frequencies == pytest.approx((310.0, 560.0), rel=1e-3)
+    assert fast.thresholds == slow.thresholds

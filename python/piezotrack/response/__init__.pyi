@@ -6,3 +6,4 @@ from .measuring import frequency_response as frequency_response
 from .modal_fit import ModalFit as ModalFit
 from .modal_fit import fit_modes as fit_modes
 from .response_file import load_response as load_response
+from .views.response_plot import plot_amplitudes as plot_amplitudes

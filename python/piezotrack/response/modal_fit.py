@@ -110,23 +110,30 @@ class ModalFit(Result):
         """Static gain, the sum of those of the modes [m/V]."""
         return float(self.gains.sum())
 
+    @property
+    def dynamics(self) -> dict[str, Any]:
+        """The modes as parameters of a stage whose hysteresis is at the input.
+
+        ``dataclasses.replace(stage, **fit.dynamics)`` gives it to one that a slow log identified.
+        """
+        beside = {
+            "mode_weights": self.gains / self.gain,
+            "mode_frequencies": self.frequencies,
+            "mode_damping_ratios": self.damping_ratios,
+        }
+        return {
+            "frequency": float(self.frequencies[0]),
+            "damping_ratio": float(self.damping_ratios[0]),
+            **{name: tuple(values[1:].tolist()) for name, values in beside.items()},
+        }
+
     @cached_property
     def stage(self) -> VirtualStage:
         """A stage without hysteresis that has these modes and this delay.
 
         For `check_loop`, `tune` and simulations of small motions.
         """
-        weights = self.gains / self.gain
-        model = PrandtlIshlinskiiStage(
-            linear=self.gain,
-            thresholds=(),
-            weights=(),
-            frequency=float(self.frequencies[0]),
-            damping_ratio=float(self.damping_ratios[0]),
-            mode_weights=tuple(weights[1:].tolist()),
-            mode_frequencies=tuple(self.frequencies[1:].tolist()),
-            mode_damping_ratios=tuple(self.damping_ratios[1:].tolist()),
-        )
+        model = PrandtlIshlinskiiStage(linear=self.gain, thresholds=(), weights=(), **self.dynamics)
         return VirtualStage.of(model, delay=self.delay, bandwidth=self.bandwidth)
 
     def document(self) -> dict[str, Any]:

@@ -12,7 +12,9 @@ from ..._support.display.plot_style import (
     DESIRED,
     ERROR,
     GUIDE,
+    MARKS,
     REPETITIVE,
+    SIMULATED,
     axes_or_new,
     caption,
     drawing,
@@ -23,18 +25,23 @@ from ..._support.display.plot_style import (
     sheet,
     whole,
 )
+from ...errors import ParameterError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
+    from ...stages.base import Stage
     from ..frequency_response import FrequencyResponse
     from ..modal_fit import ModalFit
 
     Array = NDArray[np.float64]
 
 __all__ = [
+    "plot_amplitudes",
     "plot_frequency_response",
     "plot_magnitude",
     "plot_modal_fit",
@@ -141,3 +148,65 @@ def plot_modal_fit(fit: ModalFit, fig: Figure | SubFigure | None = None) -> Figu
     phase.plot(f, np.degrees(turn), **modes)
     nyquist.plot(scale * fitted.real, scale * fitted.imag, **modes)
     return figure
+
+
+@drawing
+def plot_amplitudes(
+    responses: Sequence[FrequencyResponse],
+    frequency: float,
+    *,
+    model: Stage | None = None,
+    fig: Figure | SubFigure | None = None,
+) -> Figure:
+    """Plot gain and phase at a frequency over the amplitude: the signature of hysteresis.
+
+    Parameters
+    ----------
+    responses : sequence of FrequencyResponse
+        Measured with several ranges.
+    frequency : float
+        Of the line, the nearest of which is taken [Hz].
+    model : Stage, optional
+        A stage whose describing function is drawn over them.
+    fig : matplotlib.figure.Figure or SubFigure, optional
+        Where to draw; a new figure of pyplot where not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure drawn in.
+
+    Raises
+    ------
+    ParameterError
+        There is no response.
+    """
+    if not responses:
+        raise ParameterError("responses", "an empty list", "a response or more")
+    figure, axes = sheet(fig, (7.0, 5.6), (("gain",), ("phase",)))
+    unit, scale = responses[0].shown_unit
+    # The peak of a sine with the power of all lines.
+    sizes = np.sqrt(2.0) * np.array([one.amplitude for one in responses])
+    near = [int(np.argmin(np.abs(one.frequency - frequency))) for one in responses]
+    values = np.array([one.value[k] for one, k in zip(responses, near, strict=True)])
+    bands = np.array([one.band()[k] for one, k in zip(responses, near, strict=True)])
+    marks = {**MARKS, "label": "measured", "capsize": 3.0}
+    axes["gain"].errorbar(sizes, scale * np.abs(values), scale * bands, **marks)
+    turns = np.degrees(np.arcsin(np.minimum(1.0, bands / np.abs(values))))
+    axes["phase"].errorbar(sizes, np.degrees(np.angle(values)), turns, **marks)
+    if model is not None:
+        over = np.geomspace(0.5 * sizes.min(), 2.0 * sizes.max(), 60)
+        found = model.describing_function(over, frequency, offset=responses[0].offset)
+        # A held drive shows one sample later.
+        found = found * np.exp(-2j * np.pi * frequency * responses[0].dt)
+        line = {**SIMULATED, "label": "describing function"}
+        axes["gain"].plot(over, scale * np.abs(found), **line)
+        axes["phase"].plot(over, np.degrees(np.angle(found)), **line)
+    for ax in axes.values():
+        ax.set_xscale("log")
+    share(axes["gain"], axes["phase"])
+    axes["gain"].set(ylabel=f"gain [{unit}]")
+    axes["phase"].set(xlabel=f"amplitude [{responses[0].drive_unit}]", ylabel="phase [deg]")
+    legend_inside(axes["gain"])
+    caption(figure, f"{frequency:.4g} Hz", "medium")
+    return whole(figure)
