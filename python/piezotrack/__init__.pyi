@@ -59,6 +59,7 @@ from .identification.methods.particle_swarm import ParticleSwarm as ParticleSwar
 from .identification.problem.parameter import Parameter as Parameter
 from .identification.problem.records import Record as Record
 from .identification.watching.watch import watch as watch
+from .references.moves import move as move
 from .references.parse import parse_reference as parse_reference
 from .references.paths import circle as circle
 from .references.paths import lissajous as lissajous

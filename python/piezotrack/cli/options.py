@@ -60,8 +60,8 @@ ModelFile = Annotated[Path, Argument("Model file in JSON, as `identify` writes i
 Reference = Annotated[
     str,
     Argument(
-        "Motion: sine:0.2Hz,0..110um, triangle:, staircase:, chirp:, multisine:, or a CSV file "
-        "with time and displacement",
+        "Motion: sine:0.2Hz,0..110um, triangle:, staircase:, chirp:, multisine:, s-curve:, zv:, "
+        "zvd:, ei:, or a CSV file with time and displacement",
         "REFERENCE",
     ),
 ]

@@ -1,5 +1,6 @@
 # The public names and their homes, each written once: type checkers read them here, and
 # _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
+from .moves import move as move
 from .parse import parse_path as parse_path
 from .parse import parse_reference as parse_reference
 from .paths import circle as circle

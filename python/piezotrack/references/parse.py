@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from .._support.arguments import expect
 from .._support.messages import quoted
 from .._support.units import OTHER_UNITS, Unit, known_units, lookup
 from ..errors import ParameterError
+from .moves import move
 from .paths import circle, lissajous, raster, spiral
 from .reference import Reference, read_reference
 from .waveforms import chirp, multisine, sine, staircase, triangle
@@ -95,9 +97,32 @@ KINDS = {
         ("frequencies", "low", "duration"),
     ),
 }
+WAY: dict[tuple[str, str], tuple[str, ...]] = {
+    ("displacement", ".."): ("start", "stop"),
+    ("time", ""): ("duration",),
+}
+KINDS["s-curve"] = Kind(
+    move,
+    "s-curve:FROM..TO,dwell=TIME,rise=TIME[,DURATION]",
+    "s-curve:0..20um,dwell=100ms,rise=2ms",
+    WAY,
+    {"dwell": "time", "rise": "time"},
+    ("start", "dwell", "rise"),
+)
+KINDS |= {
+    shape: Kind(
+        partial(move, shape=shape),
+        f"{shape}:FREQUENCY,FROM..TO,dwell=TIME[,damping=NUMBER][,rise=TIME][,DURATION]",
+        f"{shape}:160Hz,0..20um,dwell=100ms",
+        {("frequency", ""): ("frequency",), **WAY},
+        {"dwell": "time", "damping": "number", "rise": "time"},
+        ("frequency", "start", "dwell"),
+    )
+    for shape in ("zv", "zvd", "ei")
+}
 # Arguments that take a list, and the names of missing items in messages.
 LISTS = ("levels", "frequencies", "sizes", "centre")
-MISSING = {"low": "range", "start_frequency": "frequencies"}
+MISSING = {"low": "range", "start": "range", "start_frequency": "frequencies"}
 
 # Written so that each letter has one meaning: the time is linear in the length of a text.
 _VALUE = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d_]*)")
@@ -118,6 +143,9 @@ def parse_reference(text: str, *, duration: float | None = None) -> Reference:
     ``staircase:levels=0/30/10um`` levels and ``dwell=1s``; optional ``rise=0.1s``, duration
     ``multisine:0.5/1.3Hz,0..9um`` frequencies, range, duration; optional ``seed=1``,
                                    ``ramp=1s``
+    ``s-curve:0..20um``            a move, with ``dwell=0.1s`` before and after, ``rise=2ms``
+    ``zv:160Hz,0..20um``           a move past a mode, ``dwell=0.1s``; also ``zvd:``, ``ei:``;
+                                   optional ``damping=0.02``, ``rise=2ms``
     ``target.csv``                 a file, as `read_reference` takes it
     ============================== =========================================================
 
@@ -133,7 +161,8 @@ def parse_reference(text: str, *, duration: float | None = None) -> Reference:
     Returns
     -------
     Reference
-        As `sine`, `triangle`, `staircase`, `chirp`, `multisine` or `read_reference` make it.
+        As `sine`, `triangle`, `staircase`, `chirp`, `multisine`, `move` or `read_reference` make
+        it.
 
     Raises
     ------

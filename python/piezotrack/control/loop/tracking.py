@@ -270,8 +270,8 @@ class Tracking(Result):
         Returns
         -------
         list of Settling
-            One for each level that is held for four samples or more, of the true displacement;
-            empty where the reference holds none.
+            One for each level that is held for four samples or more and a fifth of the longest
+            hold, of the true displacement; empty where the reference holds none.
 
         Raises
         ------
@@ -361,6 +361,7 @@ class Tracking(Result):
             "metrics": asdict(self.metrics),
             "true_metrics": asdict(self.score(true=True)),
             "periods": [asdict(period) for period in self.periods],
+            "settling": [_entry(move) for move in self.settling()],
             "model_drive_range": None,
             "notes": [],
             "provenance": {"package": "piezotrack", "version": _core.__version__},
@@ -402,6 +403,13 @@ def _metrics(
 ) -> Metrics:
     *errors, lag, loop = figures
     return Metrics(**dict(zip(FIGURES, errors, strict=True)), phase_lag=lag, widest_loop=loop)
+
+
+def _entry(move: Settling) -> dict[str, float | None]:
+    """Return a move for the JSON file, the unit in the name."""
+    times = {f"{name}_s": getattr(move, name) for name in ("start", "travel", "time")}
+    finite = {name: value if math.isfinite(value) else None for name, value in times.items()}
+    return {**finite, "low_m": move.low, "high_m": move.high, "overshoot": move.overshoot}
 
 
 def settled_from(reference: Reference, end: float) -> float:
