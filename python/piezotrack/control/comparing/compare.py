@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from statistics import fmean
+from statistics import fmean, median
 from typing import TYPE_CHECKING, Any
 
 from ... import _core
@@ -17,6 +17,7 @@ from ...stages.base import Stage
 from ..loop.chatter import chatter_of
 from ..loop.closed_loop import run_closed_loop, stepped
 from ..loop.preconditions import check_delay
+from ..loop.settling import settled_moves
 from ..loop.tracking import can_be_learnt, feedforward_of, first_counted
 from ..plant import plant_of, timing_on
 from ..tuning.margins import Margins, Spread, plants_of
@@ -42,6 +43,8 @@ __all__ = ["compare_controllers"]
 
 # Samples over which the time of a step is measured.
 TIMED = 20_000
+# Share of a step within which it has settled.
+SETTLED = 0.02
 # Seeds of the draws that controllers are judged by, after that of the sensor: beyond those of the
 # tuning and of the trials of learning.
 OTHER_DRAWS = 1000
@@ -277,11 +280,14 @@ def _cell(
     timing = replace(task.timing, delay=task.timing.delay + variant.delay)
     found = [_figures(entry, one, timing, (samples.x, voltage), first) for one in stages]
     rms, largest, effort, _, clipped = zip(*found, strict=True)
-    chatter = None
+    chatter = settled = None
     if chatters and all(map(math.isfinite, rms)):
         run = run_closed_loop(stages[0], entry.controller, samples.x, voltage, timing, 1)
         chatter = chatter_of(run.part("volts")[first:]).fast_change
-    return Cell(rms, max(largest), fmean(effort), fmean(clipped), chatter, alone)
+        _, displacement, _ = run.motion()
+        moves = settled_moves(samples.t, samples.x, displacement, SETTLED)
+        settled = median(one.time for one in moves) if moves else None
+    return Cell(rms, max(largest), fmean(effort), fmean(clipped), chatter, alone, settled)
 
 
 def _drawn(stage: VirtualStage, k: int) -> VirtualStage:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["Cell", "ControllerComparison", "Row"]
 
 # Numbers of a cell in a file.
-NUMBERS = ("rms", "spread", "largest", "effort", "clipped", "chatter")
+NUMBERS = ("rms", "spread", "largest", "effort", "clipped", "chatter", "settled")
 
 
 class Cell(NamedTuple):
@@ -44,6 +44,9 @@ class Cell(NamedTuple):
     alone : float
         True rms error with the inverse alone along that reference, on the stage that the
         controllers were tuned for [m].
+    settled : float or None
+        Median time in which the moves of a reference with levels settle to 2 % [s], with the first
+        draw, on the stage that the controllers were tuned for; infinite where they do not.
     """
 
     draws: tuple[float, ...]
@@ -52,6 +55,7 @@ class Cell(NamedTuple):
     clipped: float
     chatter: float | None
     alone: float
+    settled: float | None
 
     @property
     def rms(self) -> float:
@@ -141,6 +145,11 @@ class Row(NamedTuple):
         """Median of the chatter over the references, so that jumps of one do not decide [V]."""
         found = [one.chatter for one in self._followed() if one.chatter is not None]
         return median(found) if found else None
+
+    @property
+    def settled(self) -> float | None:
+        """Median settling time of the first reference that has levels [s]; None without one."""
+        return next((one.settled for one in self._followed() if one.settled is not None), None)
 
     def _followed(self) -> list[Cell]:
         return [one for one in self.cells[0] if one is not None]

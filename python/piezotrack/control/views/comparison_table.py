@@ -22,7 +22,7 @@ WIDTH = 100
 HEADINGS = (10, 6)
 # A number and its unit stay together.
 UNIT = re.compile(r"(?<=\d) (?=Hz|ms|%)")
-FIGURES = ("effort mV", "chatter mV", "clipped %", "Ms", "gain margin dB", "step ns")
+FIGURES = ("effort mV", "chatter mV", "clipped %", "settled ms", "Ms", "gain margin dB", "step ns")
 
 
 class Grid(NamedTuple):
@@ -129,6 +129,7 @@ def _figures(row: Row, *, searched: bool) -> list[str]:
         _plain(1e3 * row.effort, "{:.3g}"),
         "-" if row.chatter is None else _plain(1e3 * row.chatter, "{:.3g}"),
         f"{100.0 * clipped:.3g}",
+        "-" if row.settled is None else _plain(1e3 * row.settled, "{:.3g}"),
         _plain(row.sensitivity, "{:.2f}"),
         _plain(None if row.gain_margin is None else decibels(row.gain_margin), "{:.1f}"),
         f"{1e9 * row.step_time:.0f}",
