@@ -168,6 +168,22 @@ def test_chatter_is_the_fast_part_of_the_command_of_the_runs() -> None:
     assert all(one is None or one.chatter is None for one in pid.cells[1])
 
 
+def test_the_settling_time_is_that_of_the_moves() -> None:
+    stairs = pt.staircase(steps=3, low=20e-6, high=60e-6, dwell=0.3, rise=0.02)
+    sine = pt.sine(frequency=5.0, low=20e-6, high=60e-6, duration=1.2)
+    comparison = pt.compare_controllers(
+        noisy(3), plays(1.05), dt=1e-3, limits=LIMITS, references=[sine, stairs],
+        controllers=["inverse + PID"], parts="pid", **QUICK,
+    )  # fmt: skip
+    (row,) = comparison.rows
+    assert row.settled is not None
+    moves = pt.track(noisy(50), row.controller, stairs).settling(0.02)
+    times = [move.time for move in moves]
+    assert row.settled == pytest.approx(np.median(times), abs=2e-3)
+    assert row.cells[0][0] is not None
+    assert row.cells[0][0].settled is None
+
+
 def test_one_draw_has_no_spread() -> None:
     comparison = compared(controllers=["inverse + PID"], seeds=1)
     cell = comparison.rows[0].cells[0][0]
