@@ -290,8 +290,25 @@ def test_logs_that_give_no_response_are_refused() -> None:
     with pytest.raises(pt.ParameterError, match="rate"):
         pt.frequency_response(LINEAR, LINES)
     still = log_of(np.full(1000, 5.0), np.linspace(0.0, 1e-6, 1000))
-    with pytest.raises(pt.DataError, match="does not move"):
+    with pytest.raises(pt.DataError, match="drive does not move"):
         pt.frequency_response(still)
+    for drive in (u, np.random.default_rng(1).standard_normal(1000)):
+        with pytest.raises(pt.DataError, match="displacement does not move"):
+            pt.frequency_response(log_of(drive, np.full(drive.size, 1e-6)))
+
+
+def test_one_realisation_or_one_period_says_what_it_cannot_tell() -> None:
+    one = pt.frequency_response(modal(noise=1e-9), replace(LINES, realisations=1), rate=RATE)
+    assert one.distortion is None
+    assert one.noise is not None
+    assert any("one realisation" in note for note in one.notes)
+    single = pt.frequency_response(modal(noise=1e-9), replace(LINES, periods=1), rate=RATE)
+    assert single.noise is None
+    assert any("one period" in note for note in single.notes)
+    # A single period of a log repeats nothing.
+    u = LINES.signals(RATE)[0]
+    with pytest.raises(pt.ParameterError, match="half the log"):
+        pt.frequency_response(log_of(u, 1e-6 * u), period=u.size / RATE)
 
 
 def test_the_shape_and_the_range_are_kept() -> None:

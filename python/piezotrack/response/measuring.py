@@ -149,6 +149,7 @@ def _measured(
     for signal in signals:
         log = measure(device, np.tile(signal, total), obtained, rest=home)
         records.append(log[log.t[excitation.settle * count] :])
+        _check_moves(records[-1], device.channels[-1])
     # A device notes the same for every realisation.
     notes = tuple(dict.fromkeys((*notes, *(note for log in records for note in log.notes))))
     return _approximated(
@@ -176,8 +177,7 @@ def _of_logs(logs: list[Any], period: float | None, resolution: float | None) ->
                 f"{1.0 / first.dt:.6g} Hz in {first.drive_unit}, as log 0",
                 verb="has",
             )
-        if not np.ptp(log.u) > 0.0:
-            raise DataError(f"log {k}: the drive does not move: expected an excitation")
+        _check_moves(log, f"log {k}")
     counts = {
         period_of(log, None if period is None else positive("period", period, "s")) for log in logs
     }
@@ -197,6 +197,13 @@ def _of_logs(logs: list[Any], period: float | None, resolution: float | None) ->
         lines,
         excitation=f"{words} {periods} periods of {count * first.dt:.6g} s".strip(),
     )
+
+
+def _check_moves(log: Dataset, name: str) -> None:
+    """Refuse a record without an excitation, or of a sensor that shows nothing."""
+    for signal, words in ((log.u, "drive"), (log.y, "displacement")):
+        if not np.ptp(signal) > 0.0:
+            raise DataError(f"{name}: the {words} does not move: expected an excitation")
 
 
 def _excited(logs: list[Dataset], count: int) -> NDArray[np.intp]:

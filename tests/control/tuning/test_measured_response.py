@@ -41,6 +41,23 @@ def test_gains_are_those_of_the_true_stage() -> None:
     assert tuned.kept[-1].value <= 2.0
 
 
+def test_first_gains_in_ten_seconds() -> None:
+    quick = pt.RandomPhaseMultisine(
+        band=(4.0, 900.0), low=29.0, high=31.0, realisations=3, periods=2
+    )
+    # With the ramps from rest and back.
+    assert quick.duration + 3 * 2 * 0.5 < 10.0
+    device = pt.hardware.VirtualDevice(stage(), limits=LIMITS)
+    first = pt.tune(
+        pt.frequency_response(device, quick, rate=RATE), limits=LIMITS, parts="pid", search=FEW
+    )
+    true = pt.tune(stage(), dt=1 / RATE, limits=LIMITS, parts="pid", search=FEW)
+    size = [float(one.controller.feedback.kp / one.controller.feedback.ti) for one in (first, true)]  # type: ignore[union-attr]
+    assert size[0] == pytest.approx(size[1], rel=0.1)
+    assert pt.check_loop(stage(), first.controller).middle.sensitivity < 2.0
+    assert device.held == 0.0
+
+
 def test_a_wider_band_costs_gain() -> None:
     loose, tight = (
         pt.tune(
