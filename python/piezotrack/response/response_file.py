@@ -8,8 +8,8 @@ import numpy as np
 
 from .. import _core
 from .._support.messages import quoted
-from ..errors import DataError, ParameterError
-from ..identification.fitted.model_file import entries_of, read_content
+from ..errors import ParameterError
+from ..identification.fitted.model_file import checked_content, entries_of
 from .frequency_response import FORMAT, SCHEMA_VERSION, FrequencyResponse
 
 if TYPE_CHECKING:
@@ -53,17 +53,7 @@ def load_response(path: str | os.PathLike[str]) -> FrequencyResponse:
     >>> bool((again.value == response.value).all())
     True
     """
-    name, document = read_content(path)
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(
-            f"{name} is not a piezotrack frequency response: its 'format' is not '{FORMAT}'"
-        )
-    version = document.get("schema_version")
-    if version != SCHEMA_VERSION or isinstance(version, bool):
-        raise DataError(
-            f"{name}: schema_version is {quoted(version)}: expected {SCHEMA_VERSION}, which this "
-            "version of piezotrack reads"
-        )
+    name, document = checked_content(path, "frequency response", FORMAT, SCHEMA_VERSION)
     with entries_of(name):
         return _response_of(document)
 

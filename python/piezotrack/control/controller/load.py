@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from ... import _core
 from ..._support.files.json_text import object_of
 from ..._support.messages import quoted
-from ...errors import DataError, ParameterError
-from ...identification.fitted.model_file import entries_of, read_content
+from ...errors import ParameterError
+from ...identification.fitted.model_file import checked_content, entries_of
 from ..parts.file_entries import only, part_of
 from ..parts.part_info import names_of
 from .controller import DRIVE_UNITS, FORMAT, SCHEMA_VERSION, Controller
@@ -50,15 +50,7 @@ def load_controller(path: str | os.PathLike[str]) -> Controller:
     >>> pt.load_controller(path) == loop
     True
     """
-    name, document = read_content(path)
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{name} is not a piezotrack controller: its 'format' is not '{FORMAT}'")
-    version = document.get("schema_version")
-    if version != SCHEMA_VERSION or isinstance(version, bool):
-        raise DataError(
-            f"{name}: schema_version is {quoted(version)}: expected {SCHEMA_VERSION}, which this "
-            "version of piezotrack reads"
-        )
+    name, document = checked_content(path, "controller", FORMAT, SCHEMA_VERSION)
     with entries_of(name):
         controller = _controller_of(document)
         object.__setattr__(controller, "_provenance", _provenance_of(document))

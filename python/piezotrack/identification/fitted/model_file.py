@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ... import _core
 from ..._support.files.json_text import number_pair, object_of, parse_json, text_of
+from ..._support.messages import quoted
 from ..._support.units import of_drive
 from ...errors import DataError, ParameterError, PiezotrackError
 from ...stages.registry import model_named, stage_class
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from .fitted_record import FittedRecord
 
 __all__ = [
+    "checked_content",
     "entries_of",
     "load",
     "read_content",
@@ -251,6 +253,28 @@ def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
         raise DataError(
             f"{name} has schema_version {version!r}: this version of piezotrack reads "
             f"1 to {SCHEMA_VERSION}"
+        )
+    return name, document
+
+
+def checked_content(
+    path: str | os.PathLike[str], kind: str, form: str, version: int
+) -> tuple[str, dict[str, Any]]:
+    """Read a file of some `format` and `schema_version`, and return its name and its content.
+
+    Raises
+    ------
+    DataError
+        The file is missing, of another format, or of another version.
+    """
+    name, document = read_content(path)
+    if not isinstance(document, dict) or document.get("format") != form:
+        raise DataError(f"{name} is not a piezotrack {kind}: its 'format' is not '{form}'")
+    found = document.get("schema_version")
+    if found != version or isinstance(found, bool):
+        raise DataError(
+            f"{name}: schema_version is {quoted(found)}: expected {version}, which this version of "
+            "piezotrack reads"
         )
     return name, document
 
