@@ -117,10 +117,12 @@ def tune(
         By default the inverse of the first stage; of a `VirtualStage`, of which nobody knows the
         model, none. Of an XY stage one for x and one for y.
     law : str, optional
-        The feedback law: ``"pid"``; ``"pd"``, which needs a feedforward; ``"lead-lag"``;
+        The feedback law: ``"pid"``; ``"pi"``; ``"pd"``, which needs a feedforward; ``"lead-lag"``;
         ``"sliding-mode"``, ``"disturbance-observer"`` around a PID, or
         ``"perturbation-estimator"``, an observer around sliding mode. An observer expects the
-        middle plant's static gain and its time constant at low frequencies.
+        middle plant's static gain and its time constant at low frequencies. A PI law with damping
+        of the first mode: ``"integral-resonant"``, ``"positive-position"`` or
+        ``"positive-velocity-position"``.
     parts : sequence of str, optional
         Some of ``"pid"``, ``"low-pass"``, ``"notch"`` and ``"repetitive"``. By default PID and
         low-pass, a notch where a mode rings below half the sampling rate, and a repetitive part
