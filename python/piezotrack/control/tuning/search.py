@@ -30,6 +30,9 @@ __all__ = ["Solution", "search_at"]
 SLACK = 0.003
 # Searches with more and more in reserve.
 ROUNDS = 8
+# What is in reserve grows by this at least: it acts on what a margin is above 1, and would come
+# nearer and nearer to enough.
+LEAST_RESERVE = 0.002
 # By how much the cost may grow where an integral time below the interval is replaced.
 SIMILAR = 1.02
 # Budget of the search for gains from margins alone that a search along references begins with.
@@ -134,7 +137,7 @@ def search_at(problem: TuningProblem, dt: float) -> Solution:
             if not grown:
                 return _entered(problem, models, solution)
         elif not models.take_plants(beyond):
-            reserve *= 1.0 + 1.2 * (solution.excess - 1.0)
+            reserve *= 1.0 + max(1.2 * (solution.excess - 1.0), LEAST_RESERVE)
             rounds += 1
     assert solution is not None
     return solution

@@ -155,11 +155,11 @@ def law_ranges(
         "switching": ("switching", 1e-3 * span, 0.3 * span, True),
         # At the lower end it is not there.
         "observer": ("observer", 1e-7 / dt, 0.45 / dt, True),
-        # The static gain of a damping filter, beyond which the loop is unstable; almost none at the
-        # lower end.
-        "damping": ("damping", 1e-4 / largest, 0.98 / largest, False),
-        "damping_either": ("damping", -0.98 / largest, 0.98 / largest, False),
-        "damping_velocity": ("damping_velocity", -3.0 / largest, 3.0 / largest, False),
+        # The static gain of a damping filter, up to a tenth below that at which it is unstable by
+        # itself; almost none at the lower end.
+        "damping": ("damping", 1e-4 / largest, 0.9 / largest, False),
+        "damping_either": ("damping", -0.9 / largest, 0.9 / largest, False),
+        "damping_velocity": ("damping_velocity", -10.0 / largest, 10.0 / largest, False),
         "damping_frequency": ("damping_frequency", 1e-3 / dt, 1.0 / dt, True),
         "damping_ratio": ("damping_ratio", 0.05, 5.0, True),
     }
