@@ -16,7 +16,7 @@ from .goal import Goal
 from .margins import NamedPlant, plants_of
 from .model_set.searched import AxisSearch, SearchedSet
 from .starts import damped, simc
-from .structures import SOUGHT, gains_of
+from .structures import SOUGHT, damps, gains_of
 from .tuned import MarginReport
 
 if TYPE_CHECKING:
@@ -176,13 +176,13 @@ def _entered(problem: TuningProblem, models: SearchedSet, solution: Solution) ->
 
 def _rules(problem: TuningProblem, models: SearchedSet) -> list[list[float]]:
     """Gains of the tuning rule: along references, or with the filter of a law that damps."""
-    damps = "damping_frequency" in SOUGHT[problem.law]
-    if "ki" not in SOUGHT[problem.law] or not (models.follows or damps):
+    filtered = damps(problem.law)
+    if "ki" not in SOUGHT[problem.law] or not (models.follows or filtered):
         return []
 
     def of(axis: AxisSearch) -> list[dict[str, float]]:
         plants = [one.plant for one in axis.plants]
-        if not damps:
+        if not filtered:
             return simc(plants, axis.base.dt)
         modes = resonance(plants, axis.base.dt)
         return damped(problem.law, plants, modes, axis.base.dt)

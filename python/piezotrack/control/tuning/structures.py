@@ -21,6 +21,7 @@ __all__ = [
     "Gains",
     "LawName",
     "Nominal",
+    "damps",
     "gains_of",
     "law_of",
     "law_ranges",
@@ -123,6 +124,11 @@ def gains_of(pid: Pid, dt: float) -> Gains:
         td=pid.td if has_p and has_d else None,
         kd=kd if has_d else None,
     )
+
+
+def damps(law: str) -> bool:
+    """Whether a law has a filter that damps."""
+    return "damping_frequency" in SOUGHT[law]
 
 
 def nominal_of(plant: _core.LoopPlant) -> Nominal:

@@ -14,6 +14,7 @@ from .model_set.other_kind import tried_on_other_kind
 from .problem import TuningProblem
 from .refusal import refusal
 from .search import Solution, search_at
+from .structures import damps
 from .tuned import Tuned
 
 if TYPE_CHECKING:
@@ -92,7 +93,8 @@ def tune(
     those that are farthest from each other; what it finds is checked exactly on all, and where
     another is beyond or follows worse by 2 %, it is repeated with that. Without a reference the
     gains follow from the margins alone: the largest integral gain that keeps them (Panagopoulos,
-    Astrom and Hagglund 2002, doi 10.1049/ip-cta:20020013).
+    Astrom and Hagglund 2002, doi 10.1049/ip-cta:20020013); of a law that damps the least of
+    ``|P S / w|`` at its largest, which at low frequencies is 1 over that gain.
 
     For an XY stage the error is the contour error, and each axis gets a controller of its own:
     ``x, y = pt.tune(xy_stage, path, ...).controllers``, for `contour`. The search takes what
@@ -229,7 +231,8 @@ def _on_other_kind(problem: TuningProblem, best: Solution) -> OtherKind | None:
 
 def _minimised(problem: TuningProblem) -> str:
     if not problem.references:
-        return "integral gain from margins alone"
+        what = "answer to disturbances" if damps(problem.law) else "integral gain"
+        return f"{what} from margins alone"
     words = MINIMISED[problem.goal.minimise]
     if problem.goal.tolerances and problem.goal.minimise == "rms":
         words += ", each motion in shares of its tolerance"
