@@ -7,8 +7,9 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use piezotrack_control::hysteresis::{BoucWen, Dahl};
 use piezotrack_control::{
-    Controller, DahlInverse, DisturbanceObserver, Feedback, HysteresisObserver, IterativeLearning,
-    LeadLag, Limits, Pid, Repetitive, ScheduledPid, SlidingMode, Smoothing, StateSpace,
+    Controller, DahlInverse, DisturbanceObserver, Feedback, HysteresisObserver,
+    IntegralResonantControl, IterativeLearning, LeadLag, Limits, Pid, PositivePositionFeedback,
+    PositiveVelocityPositionFeedback, Repetitive, ScheduledPid, SlidingMode, Smoothing, StateSpace,
 };
 use piezotrack_core::integrator::{FEW_TERMS, TERMS};
 use piezotrack_core::models::DahlStage;
@@ -120,6 +121,12 @@ fn laws(criterion: &mut Criterion) {
     let bouc_wen = BoucWen { rise: 0.36, beta: 0.036, gamma: 0.027, exponent: 1.0 };
     let observer = HysteresisObserver::new(bouc_wen, 1.1e-6, 0.05, 0.1, 100e-6).unwrap();
     law(criterion, "observer of a Bouc-Wen hysteresis", observer.around(pid, dt).unwrap());
+    let resonant = IntegralResonantControl::new(1e7, 3e-6).unwrap();
+    law(criterion, "integral resonant control", resonant.around(pid, dt).unwrap());
+    let position = PositivePositionFeedback::new(0.2e6, 7.0, 0.6).unwrap();
+    law(criterion, "positive position feedback", position.around(pid, dt).unwrap());
+    let both = PositiveVelocityPositionFeedback::new(-0.1e6, 0.2e6, 9.0, 0.6).unwrap();
+    law(criterion, "positive velocity and position feedback", both.around(pid, dt).unwrap());
 }
 
 fn law<F: Feedback>(criterion: &mut Criterion, name: &str, feedback: F) {

@@ -48,6 +48,7 @@ __all__ = [
     "delayed",
     "identify",
     "identify_weights",
+    "law_reference_numerator",
     "law_transfer_function",
     "linearised_covariance",
     "loop_response",
@@ -337,6 +338,7 @@ class Controller:
     def step_time(self, samples: int) -> float: ...
     def start(self, present: float | None) -> Session: ...
 
+def law_reference_numerator(law: tuple[str, list[float]], dt: float) -> list[float] | None: ...
 def law_transfer_function(law: tuple[str, list[float]], dt: float) -> list[list[float]]: ...
 
 @final

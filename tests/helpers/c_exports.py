@@ -65,6 +65,20 @@ PARTS: dict[str, dict[str, Any]] = {
         "feedback": pt.control.PerturbationEstimator(sliding=SLIDING, plant_gain=1.5e-6, cutoff=1.0)
     },
     "hysteresis observer": {"feedback": pt.control.HysteresisObserver(stage=DAHL, pid=PI)},
+    "integral resonant control": {
+        "feedback": pt.control.IntegralResonantControl(pid=PI, gain=1e7, feedthrough=3e-6)
+    },
+    "positive position feedback": {
+        "feedback": pt.control.PositivePositionFeedback(
+            pid=PI, gain=0.2e6, frequency=7.0, damping_ratio=0.6
+        ),
+        "filters": [pt.LowPass(20.0)],
+    },
+    "positive velocity and position feedback": {
+        "feedback": pt.control.PositiveVelocityPositionFeedback(
+            pid=PI, velocity_gain=-0.1e6, position_gain=0.2e6, frequency=9.0, damping_ratio=0.6
+        )
+    },
     "repetitive": {"feedback": PI, "repetitive": learner(period=5.0, kq=0.3, tq=0.05)},
     "repetitive, part of a sample": {
         "feedback": PI,

@@ -57,7 +57,7 @@ const MODELS: [&str; 14] = [
 ];
 
 /// From the bottom up.
-const CONTROL: [&str; 27] = [
+const CONTROL: [&str; 28] = [
     "error",
     "number",
     "unfused",
@@ -79,6 +79,7 @@ const CONTROL: [&str; 27] = [
     "scheduled_pid",
     "lead_lag",
     "sliding_mode",
+    "damping",
     "disturbance_observer",
     "hysteresis_observer",
     "repetitive",

@@ -90,6 +90,10 @@ def _feedback(numbers: dict[str, Any], unit: str) -> dict[str, Any]:
         if kind in numbers:
             around = dict(zip(names, numbers[kind], strict=True))
             return {"kind": kind} | around | {"inside": inside}
+    if "damping" in numbers:
+        b0, b1, b2, *a = numbers["damping"]
+        measured = _biquad([b0, b1, b2], [1.0, *a])
+        return {"kind": "damping", "of_measurement": measured, "inside": inside}
     return inside
 
 

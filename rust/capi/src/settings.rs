@@ -34,6 +34,9 @@ pub struct Numbers {
 /// | "perturbation-estimator" | those of the sliding mode; gain (m/V), time (s), cutoff (Hz) |
 /// | "scheduled-pid" | counts of amplitudes and rates, both (m, Hz), the first of each; PIDs |
 /// | "hysteresis-observer" | those of the PID; gain (m/V), time (s), correction, stroke (m); a1, a2, curvature of a Dahl hysteresis, or rise, beta, gamma, exponent of a Bouc-Wen one |
+/// | "integral-resonant" | those of the PID; gain (V/m/s), feedthrough (m/V) |
+/// | "positive-position" | those of the PID; gain (V/m), frequency (Hz), damping ratio |
+/// | "positive-velocity-position" | those of the PID; gains of velocity and position (V/m), frequency (Hz), damping ratio |
 #[repr(C)]
 pub struct Settings {
     /// Sampling interval, s.

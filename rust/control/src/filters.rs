@@ -83,6 +83,12 @@ impl Filter {
         })
     }
 
+    /// A filter of these coefficients, whose state begins at `Some([0.0; 2])` where its static gain
+    /// is not 1.
+    pub(crate) fn of(b: [f64; 3], a: [f64; 2]) -> Self {
+        Self { b, a }
+    }
+
     /// `[b0, b1, b2]` and `[a1, a2]` of the recursion.
     #[must_use]
     pub fn coefficients(&self) -> ([f64; 3], [f64; 2]) {

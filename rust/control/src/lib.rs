@@ -41,6 +41,7 @@ pub mod controller;
 pub mod creep;
 pub mod cubic_motion;
 mod cubic_segment;
+pub mod damping;
 pub mod disturbance_observer;
 pub mod dynamics;
 mod error;
@@ -66,6 +67,10 @@ pub mod unfused;
 
 pub use controller::{Command, Controller, ControllerState};
 pub use creep::{Creep, CreepState};
+pub use damping::damped::{Damped, DampedState};
+pub use damping::integral_resonant::IntegralResonantControl;
+pub use damping::positive_position::PositivePositionFeedback;
+pub use damping::positive_velocity_position::PositiveVelocityPositionFeedback;
 pub use disturbance_observer::{DisturbanceObserver, Observed, ObservedState};
 pub use dynamics::{Dynamics, MOST_MODES, Mode, Modes};
 pub use error::{Error, Result};

@@ -240,9 +240,12 @@ impl FoundSettings {
 fn structure((name, gain, time): &(String, f64, f64)) -> Result<Structure> {
     let nominal = Nominal { gain: *gain, time: *time };
     Ok(match name.as_str() {
-        "pid" | "pd" => Structure::Pid,
+        "pid" | "pi" | "pd" => Structure::Pid,
         "lead-lag" => Structure::LeadLag,
         "sliding-mode" => Structure::SlidingMode,
+        "integral-resonant" => Structure::IntegralResonant,
+        "positive-position" => Structure::PositivePosition,
+        "positive-velocity-position" => Structure::PositiveVelocityPosition,
         "disturbance-observer" => Structure::DisturbanceObserver(nominal),
         "perturbation-estimator" => Structure::PerturbationEstimator(nominal),
         other => {

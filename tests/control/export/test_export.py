@@ -162,7 +162,8 @@ def test_the_square_root_is_rounded_as_that_of_the_library(tmp_path: Path) -> No
 
 @needs_gcc
 def test_a_bumpless_start_is_that_of_rust(tmp_path: Path) -> None:
-    for name in ("PID", "sliding mode", "state space", "perturbation", "hysteresis observer"):
+    laws = ("PID", "sliding mode", "state space", "perturbation", "hysteresis observer")
+    for name in (*laws, "positive position feedback"):
         controller = loop(name)
         export(controller, tmp_path, name="axis")
         program = """#include <stdio.h>

@@ -153,6 +153,9 @@ def test_searches_with_any_seed_end_at_the_same_error() -> None:
         ({"parts": ("pid", "low-pass", "notch")}, {"parts": ("pid", "low-pass")}),
         ({"law": "disturbance-observer"}, {"law": "pid"}),
         ({"law": "perturbation-estimator"}, {"law": "sliding-mode"}),
+        ({"law": "integral-resonant"}, {"law": "pi"}),
+        ({"law": "positive-position"}, {"law": "pi"}),
+        ({"law": "positive-velocity-position"}, {"law": "positive-position"}),
     ],
 )
 def test_a_law_is_not_worse_than_the_one_inside_of_it(

@@ -3,7 +3,8 @@
 use piezotrack_control::hysteresis::{BoucWen, Dahl};
 use piezotrack_control::{
     Controller, ControllerState, DisturbanceObserver, Feedback, Filter, HysteresisObserver,
-    LeadLag, Limits, Observable, Pid, Repetitive, ScheduledPid, SlidingMode, Smoothing, Snapshot,
+    IntegralResonantControl, LeadLag, Limits, Observable, Pid, PositivePositionFeedback,
+    PositiveVelocityPositionFeedback, Repetitive, ScheduledPid, SlidingMode, Smoothing, Snapshot,
     Span, StateSpace,
 };
 use piezotrack_core::parts::{Law, LawState, MOST_STATES};
@@ -78,6 +79,30 @@ fn laws(kp: f64, time: f64, cutoff: f64) -> Vec<Law> {
         sampled
             .and_then(|law| hysteresis(bouc_wen(), 0.2)?.around(law, DT).ok())
             .map(Law::BoucWenObserver),
+        sampled
+            .and_then(|law| {
+                IntegralResonantControl::new(5.0 * cutoff / GAIN, 10.0 * GAIN)
+                    .ok()?
+                    .around(law, DT)
+                    .ok()
+            })
+            .map(Law::Damped),
+        sampled
+            .and_then(|law| {
+                PositivePositionFeedback::new(0.1 / GAIN, 20.0 * cutoff, 0.5)
+                    .ok()?
+                    .around(law, DT)
+                    .ok()
+            })
+            .map(Law::Damped),
+        sampled
+            .and_then(|law| {
+                PositiveVelocityPositionFeedback::new(-0.05 / GAIN, 0.1 / GAIN, 20.0 * cutoff, 0.5)
+                    .ok()?
+                    .around(law, DT)
+                    .ok()
+            })
+            .map(Law::Damped),
     ]
     .into_iter()
     .flatten()
@@ -143,7 +168,7 @@ fn act_on(controller: &Controller<Law>, state: &mut State, act: &Act) -> f64 {
 fn the_table_has_every_law() {
     let kinds: Vec<_> = laws(0.1e6, 0.1, 0.5).iter().map(std::mem::discriminant).collect();
     for (i, kind) in kinds.iter().enumerate() {
-        // Adjacent laws of one kind only: nine kinds, all of them sampled.
+        // Adjacent laws of one kind only: ten kinds, all of them sampled.
         assert_eq!(kinds.iter().rposition(|other| other == kind), {
             let run = kinds[i..].iter().take_while(|other| *other == kind).count();
             Some(i + run - 1)
@@ -153,7 +178,7 @@ fn the_table_has_every_law() {
     for pair in kinds.windows(2) {
         changes += usize::from(pair[0] != pair[1]);
     }
-    assert_eq!((kinds.len(), changes), (13, 9));
+    assert_eq!((kinds.len(), changes), (16, 10));
 }
 
 proptest! {

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from .part_info import Number
 
-__all__ = ["FeedbackLaw", "Part", "flat", "part", "part_class"]
+__all__ = ["FeedbackLaw", "Part", "flat", "in_powers_of_z", "part", "part_class"]
 
 # The classes of the parts by their names, filled by the decorator.
 REGISTERED: dict[str, type[Part]] = {}
@@ -74,7 +74,7 @@ class FeedbackLaw(Part):
     def _linear(self, dt: float) -> tuple[Any, ...]:
         """Numerator and denominator in z, highest power first; or the matrices A, B, C and D."""
         powers = _core.law_transfer_function(self._settings, dt)
-        return tuple(_in_powers_of_z(one) for one in powers)
+        return tuple(in_powers_of_z(one) for one in powers)
 
 
 P = TypeVar("P", bound=Part)
@@ -139,7 +139,18 @@ def flat(of: Number, value: Any) -> list[Any]:
     return [math.nan if value is None and of.is_optional else _core.as_number(of.name, value)]
 
 
-def _in_powers_of_z(coefficients: list[float]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Take powers of z - 1, constant term first, to powers of z, highest first."""
+def in_powers_of_z(coefficients: list[float]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Take powers of z - 1, constant term first, to powers of z, highest first.
+
+    Parameters
+    ----------
+    coefficients : list of float
+        Those of the powers of z - 1.
+
+    Returns
+    -------
+    ndarray
+        Those of the powers of z.
+    """
     powers = np.polynomial.Polynomial(coefficients)(np.polynomial.Polynomial([-1.0, 1.0]))
     return np.asarray(powers.coef[::-1], dtype=np.float64)

@@ -73,7 +73,7 @@ class Box(NamedTuple):
         """Name the settings that are at an end of their range, with the drive's unit of a gain."""
         notes = []
         law = self.parts(settings).feedback
-        absent = ["kd", "order", "lead", "notch_depth"]
+        absent = ["kd", "order", "lead", "notch_depth", "damping"]
         if law._pid is not None and gains_of(law._pid, self.dt).kp is None:
             absent.append("kp")
         for name, low, high, logarithmic in self.ranges:
@@ -101,6 +101,9 @@ class Box(NamedTuple):
             "lag_time": (1e3, "ms"),
             "switching": (scale, unit),
             "observer": (1.0, "Hz"),
+            "damping": (1e-6 * scale, f"{unit}/um"),
+            "damping_velocity": (1e-6 * scale, f"{unit}/um"),
+            "damping_frequency": (1.0, "Hz"),
             "cutoff": (1.0, "Hz"),
             "notch_frequency": (1.0, "Hz"),
             "kq": (scale, f"{unit}/um"),

@@ -15,8 +15,8 @@ from .box import box_of, resonance
 from .goal import Goal
 from .margins import NamedPlant, plants_of
 from .model_set.searched import AxisSearch, SearchedSet
-from .starts import simc
-from .structures import gains_of
+from .starts import damped, simc
+from .structures import SOUGHT, damps, gains_of
 from .tuned import MarginReport
 
 if TYPE_CHECKING:
@@ -30,6 +30,9 @@ __all__ = ["Solution", "search_at"]
 SLACK = 0.003
 # Searches with more and more in reserve.
 ROUNDS = 8
+# What is in reserve grows by this at least: it acts on what a margin is above 1, and would come
+# nearer and nearer to enough.
+LEAST_RESERVE = 0.002
 # By how much the cost may grow where an integral time below the interval is replaced.
 SIMILAR = 1.02
 # Budget of the search for gains from margins alone that a search along references begins with.
@@ -116,7 +119,8 @@ def search_at(problem: TuningProblem, dt: float) -> Solution:
     """
     axes = [_axis_search(problem, axis, dt) for axis in problem.axes]
     models = SearchedSet(problem, axes, dt)
-    starts = _starts(problem, models) if models.follows else []
+    rules = _rules(problem, models)
+    starts = _starts(problem, models, rules) if models.follows else rules
     reserve, rounds = 1.0, 0
     solution: Solution | None = None
     while rounds < ROUNDS:
@@ -133,7 +137,7 @@ def search_at(problem: TuningProblem, dt: float) -> Solution:
             if not grown:
                 return _entered(problem, models, solution)
         elif not models.take_plants(beyond):
-            reserve *= 1.0 + 1.2 * (solution.excess - 1.0)
+            reserve *= 1.0 + max(1.2 * (solution.excess - 1.0), LEAST_RESERVE)
             rounds += 1
     assert solution is not None
     return solution
@@ -149,7 +153,7 @@ def _entered(problem: TuningProblem, models: SearchedSet, solution: Solution) ->
     for k, axis in enumerate(solution.axes):
         settings = dict(solution.outcome["settings"][k])
         pid = axis.box.parts(settings).feedback._pid
-        if axis.box.law != "pid" or pid is None:
+        if axis.box.law not in ("pid", "pi") or pid is None:
             continue
         gains = gains_of(pid, axis.box.dt)
         if gains.kp is None or gains.ti is not None or gains.ki is None:
@@ -170,17 +174,31 @@ def _entered(problem: TuningProblem, models: SearchedSet, solution: Solution) ->
     return solution
 
 
-def _starts(problem: TuningProblem, models: SearchedSet) -> list[list[float]]:
+def _rules(problem: TuningProblem, models: SearchedSet) -> list[list[float]]:
+    """Gains of the tuning rule: along references, or with the filter of a law that damps."""
+    filtered = damps(problem.law)
+    if "ki" not in SOUGHT[problem.law] or not (models.follows or filtered):
+        return []
+
+    def of(axis: AxisSearch) -> list[dict[str, float]]:
+        plants = [one.plant for one in axis.plants]
+        if not filtered:
+            return simc(plants, axis.base.dt)
+        modes = resonance(plants, axis.base.dt)
+        return damped(problem.law, plants, modes, axis.base.dt)
+
+    return [models.place(gains) for gains in zip(*map(of, models.axes), strict=True)]
+
+
+def _starts(
+    problem: TuningProblem, models: SearchedSet, starts: list[list[float]]
+) -> list[list[float]]:
     """Gains of the tuning rule, and those from margins alone.
 
     The plants that these do not keep join the search.
     """
-    axes = models.axes
-    ranges = [one for axis in axes for one in axis.box.ranges]
-    if not any(name == "ki" for name, *_ in ranges):
+    if not starts:
         return []
-    rules = [simc([one.plant for one in axis.plants], axis.base.dt) for axis in axes]
-    starts = [models.place(gains) for gains in zip(*rules, strict=True)]
     alone = replace(problem, goal=Goal(), search=replace(problem.search, **ALONE))
     margins = _with_reserve(problem.margins, 1.0)
     for _ in range(ROUNDS):

@@ -21,6 +21,7 @@ __all__ = [
     "Gains",
     "LawName",
     "Nominal",
+    "damps",
     "gains_of",
     "law_of",
     "law_ranges",
@@ -32,20 +33,35 @@ VANISHING = 0.01
 
 LawName = Literal[
     "pid",
+    "pi",
     "pd",
     "lead-lag",
     "sliding-mode",
     "disturbance-observer",
     "perturbation-estimator",
+    "integral-resonant",
+    "positive-position",
+    "positive-velocity-position",
 ]
-# The settings of each law that are sought; a PD law is a PID without integral gain.
+# The settings of each law that are sought; PI and PD laws are a PID without the other gain.
 SOUGHT = {
     "pid": ("kp", "ki", "kd"),
+    "pi": ("kp", "ki"),
     "pd": ("kp", "kd"),
     "lead-lag": ("static", "lead_time", "lag_time"),
     "sliding-mode": ("kp", "ki", "kd", "switching"),
     "disturbance-observer": ("kp", "ki", "kd", "observer"),
     "perturbation-estimator": ("kp", "ki", "kd", "switching", "observer"),
+    "integral-resonant": ("kp", "ki", "damping", "damping_frequency"),
+    "positive-position": ("kp", "ki", "damping", "damping_frequency", "damping_ratio"),
+    "positive-velocity-position": (
+        "kp",
+        "ki",
+        "damping_velocity",
+        "damping_either",
+        "damping_frequency",
+        "damping_ratio",
+    ),
 }
 
 
@@ -110,6 +126,11 @@ def gains_of(pid: Pid, dt: float) -> Gains:
     )
 
 
+def damps(law: str) -> bool:
+    """Whether a law has a filter that damps."""
+    return "damping_frequency" in SOUGHT[law]
+
+
 def nominal_of(plant: _core.LoopPlant) -> Nominal:
     """Reduce a plant to its static gain and the slope of its phase at low frequencies."""
     rows, b, c, d, delay = plant.matrices()
@@ -140,6 +161,13 @@ def law_ranges(
         "switching": ("switching", 1e-3 * span, 0.3 * span, True),
         # At the lower end it is not there.
         "observer": ("observer", 1e-7 / dt, 0.45 / dt, True),
+        # The static gain of a damping filter, up to a tenth below that at which it is unstable by
+        # itself; almost none at the lower end.
+        "damping": ("damping", 1e-4 / largest, 0.9 / largest, False),
+        "damping_either": ("damping", -0.9 / largest, 0.9 / largest, False),
+        "damping_velocity": ("damping_velocity", -10.0 / largest, 10.0 / largest, False),
+        "damping_frequency": ("damping_frequency", 1e-3 / dt, 1.0 / dt, True),
+        "damping_ratio": ("damping_ratio", 0.05, 5.0, True),
     }
     return [ranges[name] for name in SOUGHT[law]]
 
@@ -166,8 +194,24 @@ def law_of(
         values |= {"switching": settings["switching"], "layer": settings["switching"] / kp}
     if "observer" in settings:
         values["cutoff"] = settings["observer"]
-    made: FeedbackLaw = _made("pid" if law == "pd" else law, values)
+    if "damping" in settings:
+        values |= _damping(law, settings, sign)
+    made: FeedbackLaw = _made("pid" if law in ("pi", "pd") else law, values)
     return made
+
+
+def _damping(law: str, settings: Mapping[str, float], sign: float) -> dict[str, float]:
+    """Return the numbers of a damping filter."""
+    gain, frequency = sign * settings["damping"], settings["damping_frequency"]
+    if law == "integral-resonant":
+        return {"gain": gain * 2.0 * math.pi * frequency, "feedthrough": 1.0 / gain}
+    return {
+        "gain": gain,
+        "position_gain": gain,
+        "velocity_gain": sign * settings.get("damping_velocity", 0.0),
+        "frequency": frequency,
+        "damping_ratio": settings["damping_ratio"],
+    }
 
 
 def _made(name: str, values: Mapping[str, Any]) -> Any:

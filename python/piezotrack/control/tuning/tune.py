@@ -16,6 +16,7 @@ from .model_set.other_kind import tried_on_other_kind
 from .problem import TuningProblem
 from .refusal import refusal
 from .search import Solution, search_at
+from .structures import damps
 from .tuned import Tuned
 
 if TYPE_CHECKING:
@@ -98,7 +99,8 @@ def tune(
     those that are farthest from each other; what it finds is checked exactly on all, and where
     another is beyond or follows worse by 2 %, it is repeated with that. Without a reference the
     gains follow from the margins alone: the largest integral gain that keeps them (Panagopoulos,
-    Astrom and Hagglund 2002, doi 10.1049/ip-cta:20020013).
+    Astrom and Hagglund 2002, doi 10.1049/ip-cta:20020013); of a law that damps the least of
+    ``|P S / w|`` at its largest, which at low frequencies is 1 over that gain.
 
     For an XY stage the error is the contour error, and each axis gets a controller of its own:
     ``x, y = pt.tune(xy_stage, path, ...).controllers``, for `contour`. The search takes what
@@ -124,10 +126,12 @@ def tune(
         By default the inverse of the first stage; of a `VirtualStage`, of which nobody knows the
         model, none. Of an XY stage one for x and one for y.
     law : str, optional
-        The feedback law: ``"pid"``; ``"pd"``, which needs a feedforward; ``"lead-lag"``;
+        The feedback law: ``"pid"``; ``"pi"``; ``"pd"``, which needs a feedforward; ``"lead-lag"``;
         ``"sliding-mode"``, ``"disturbance-observer"`` around a PID, or
         ``"perturbation-estimator"``, an observer around sliding mode. An observer expects the
-        middle plant's static gain and its time constant at low frequencies.
+        middle plant's static gain and its time constant at low frequencies. A PI law with damping
+        of the first mode: ``"integral-resonant"``, ``"positive-position"`` or
+        ``"positive-velocity-position"``.
     parts : sequence of str, optional
         Some of ``"pid"``, ``"low-pass"``, ``"notch"`` and ``"repetitive"``. By default PID and
         low-pass, a notch where a mode rings below half the sampling rate, and a repetitive part
@@ -256,7 +260,8 @@ def _on_other_kind(problem: TuningProblem, best: Solution) -> OtherKind | None:
 
 def _minimised(problem: TuningProblem) -> str:
     if not problem.references:
-        return "integral gain from margins alone"
+        what = "answer to disturbances" if damps(problem.law) else "integral gain"
+        return f"{what} from margins alone"
     words = MINIMISED[problem.goal.minimise]
     if problem.goal.tolerances and problem.goal.minimise == "rms":
         words += ", each motion in shares of its tolerance"

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     Numbers = Mapping[str, Sequence[float]]
 
-__all__ = ["disturbance_observer", "no_law", "pid", "sliding_mode", "state_space"]
+__all__ = ["damping", "disturbance_observer", "no_law", "pid", "sliding_mode", "state_space"]
 
 
 def no_law() -> Part:
@@ -374,5 +374,75 @@ static real observer_step(NAME_state *s, const struct sample *in)
         s->observer_begun = 0;
     }
     return s->observer_volts;
+}
+"""
+
+
+def damping(numbers: Numbers, unit: str) -> Part:
+    """Make the damping filter of the measurement beside the PID."""
+    b0, b1, b2, a1, a2 = numbers["damping"]
+    return Part(
+        title="damping by a filter of the measurement",
+        constants=(
+            Constant("DAMPING_B0", b0, f"K = (b0 + b1/z + b2/z^2)/(1 + a1/z + a2/z^2), {unit}/m"),
+            Constant("DAMPING_B1", b1, f"{unit}/m"),
+            Constant("DAMPING_B2", b2, f"{unit}/m"),
+            Constant("DAMPING_A1", a1, "of the poles"),
+            Constant("DAMPING_A2", a2, "of the poles"),
+        ),
+        fields=(
+            Field("real", "damping_s1", f"memory of the filter, {unit}"),
+            Field("real", "damping_s2", f"memory of the filter, {unit}"),
+            Field("real", "damping_origin", "the first reading, m"),
+            Field("real", "damping_volts", f"the last output, {unit}"),
+            Field("flag", "damping_begun", "whether there was a reading"),
+        ),
+        code=DAMPING_CODE,
+        operations=Operations(6, 5),
+    )
+
+
+DAMPING_CODE = """\
+static void damping_forget(NAME_state *s)
+{
+    s->damping_s1 = 0;
+    s->damping_s2 = 0;
+    s->damping_origin = 0;
+    s->damping_begun = 0;
+}
+
+static void damping_start(NAME_state *s, real volts)
+{
+    pid_start(s, volts);
+    damping_forget(s);
+    s->damping_volts = volts;
+}
+
+static void damping_rest(NAME_state *s)
+{
+    pid_rest(s);
+    damping_forget(s);
+    s->damping_volts = 0;
+}
+
+static real damping_step(NAME_state *s, const struct sample *in)
+{
+    real place, damping, volts;
+    if (!s->damping_begun) {
+        s->damping_origin = in->measured;
+        s->damping_begun = 1;
+    }
+    place = in->measured - s->damping_origin;
+    damping = DAMPING_B0 * place + s->damping_s1;
+    s->damping_s1 = DAMPING_B1 * place - DAMPING_A1 * damping + s->damping_s2;
+    s->damping_s2 = DAMPING_B2 * place - DAMPING_A2 * damping;
+    volts = pid_step(s, in) + damping;
+    if (is_finite(volts)) {
+        s->damping_volts = volts;
+    } else {
+        /* overflow: hold the output, count from the next reading */
+        damping_forget(s);
+    }
+    return s->damping_volts;
 }
 """

@@ -14,7 +14,7 @@ from ...errors import DataError, ParameterError, ShapeError
 from .dahl import dahl_observer
 from .input import filters, helpers, readings
 from .inverse import dahl_inverse, voltage_table
-from .laws import disturbance_observer, pid, sliding_mode, state_space
+from .laws import damping, disturbance_observer, pid, sliding_mode, state_space
 from .loop import Shape, loop, sample
 from .repetitive import repetitive
 
@@ -39,6 +39,9 @@ FUNCTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "disturbance-observer": ("observer", ("applied", "feedforward")),
     "perturbation-estimator": ("observer", ("applied", "feedforward")),
     "hysteresis-observer": ("observer", ("measured", "applied")),
+    "integral-resonant": ("damping", ("measured",)),
+    "positive-position": ("damping", ("measured",)),
+    "positive-velocity-position": ("damping", ("measured",)),
 }
 # The coefficients of a law that has a form in C: of itself, or of the law inside.
 FIRST = {"pid", "b", "sliding-mode"}
@@ -168,8 +171,8 @@ def _law_of(controller: Controller) -> tuple[str, tuple[str, ...]]:
     raise ParameterError(
         "feedback",
         f"a {what}, which has no form in C, as its step needs powers or logarithms",
-        "a PID, state space, lead-lag, sliding mode, a disturbance observer or the "
-        "hysteresis observer of a Dahl stage, or to='library', which has all",
+        "a PID, also with damping, state space, lead-lag, sliding mode, a disturbance observer or "
+        "the hysteresis observer of a Dahl stage, or to='library', which has all",
     )
 
 
@@ -254,4 +257,6 @@ def _laws(numbers: Numbers, unit: str) -> list[Part]:
         laws.append(disturbance_observer(numbers, unit, name))
     if "dahl-observer" in numbers:
         laws.append(dahl_observer(numbers, unit))
+    if "damping" in numbers:
+        laws.append(damping(numbers, unit))
     return laws

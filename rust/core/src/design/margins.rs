@@ -5,8 +5,9 @@ use core::f64::consts::{PI, TAU};
 use piezotrack_control::Filter;
 
 use super::argument_principle::{Peak, Place};
+use super::linear_feedback::LinearFeedback;
 use super::plant::LoopPlant;
-use super::sampled_loop::{LinearFeedback, SampledLoop};
+use super::sampled_loop::SampledLoop;
 use crate::error::{Error, Result};
 use crate::math::C;
 
@@ -52,7 +53,8 @@ pub struct Response {
     pub open: Vec<[f64; 2]>,
     /// Sensitivity S = 1/(1 + L), from reference to error.
     pub sensitivity: Vec<[f64; 2]>,
-    /// Complementary sensitivity T = L/(1 + L).
+    /// From the reference to the filtered displacement: T = L/(1 + L), but for a law that damps by
+    /// the displacement alone, of which T = G F C/(1 + L), C the part that tracks.
     pub complementary: Vec<[f64; 2]>,
     /// |Q (1 - z^lead Kq G F/(1 + G F C))|, what a period leaves of what the last one knew; 0
     /// without a repetitive part.
@@ -156,7 +158,7 @@ impl SampledLoop {
             let closed = place.closed().value;
             out.open.push(pair(place.open()));
             out.sensitivity.push(pair(place.parts.a.value / closed));
-            out.complementary.push(pair(place.parts.b.value / closed));
+            out.complementary.push(pair(self.complementary(place.delta)));
             out.learning.push(self.learning_gain(place.delta).norm());
         }
         Ok(out)

@@ -14,6 +14,7 @@
 //! even a static plant answers one sample later.
 
 mod argument_principle;
+mod linear_feedback;
 mod margins;
 mod plant;
 mod sampled_loop;
@@ -21,9 +22,10 @@ mod small_signal_gain;
 mod stability;
 mod verdict;
 
+pub use linear_feedback::LinearFeedback;
 pub use margins::{Margins, Response, margins};
 pub use plant::LoopPlant;
-pub use sampled_loop::{LinearFeedback, SampledLoop};
+pub use sampled_loop::SampledLoop;
 pub use stability::{GainRange, Root};
 pub use verdict::{Verdict, check_loop};
 

@@ -3,9 +3,10 @@
 use piezotrack_control::{Controller, Feedback};
 
 use super::argument_principle::{Peak, Place};
+use super::linear_feedback::LinearFeedback;
 use super::margins::Margins;
 use super::plant::LoopPlant;
-use super::sampled_loop::{LinearFeedback, SampledLoop};
+use super::sampled_loop::SampledLoop;
 use super::stability::{GainRange, Root};
 use crate::error::Result;
 use crate::math::C;

@@ -246,6 +246,28 @@ impl PlantSet {
         out.unwrap_or_else(|| walk(0, 0, |_| C::new(0.0, 0.0)))
     }
 
+    /// Largest displacement that a disturbance of the drive causes, over its angle: `|G S/(z - 1)|`,
+    /// m/V, of the worst plant.
+    ///
+    /// For slow disturbances it is 1 over the integral gain, the integral of the error after a step;
+    /// where a mode rings it is more.
+    #[must_use]
+    pub fn disturbed(&self, controller: &Controller<Law>) -> f64 {
+        let [above, below] = controller.feedback.transfer_function();
+        let law = self.along(&Ratio { above, below });
+        let filters = controller.filters.iter().flatten();
+        let passed = self.along(&filters.fold(Ratio::constant(1.0), in_series));
+        let one = C::new(1.0, 0.0);
+        let plants = self.responses.iter().map(|response| {
+            let places = response.iter().zip(&law).zip(&passed).zip(&self.delta);
+            let sizes = places.map(|(((plant, law), passed), delta)| {
+                (plant / ((one + plant * passed * law) * delta)).norm_sqr()
+            });
+            sizes.fold(0.0, f64::max)
+        });
+        libm::sqrt(plants.fold(0.0, f64::max))
+    }
+
     fn along(&self, ratio: &Ratio) -> Vec<C> {
         self.delta.iter().map(|delta| of(ratio, *delta)).collect()
     }

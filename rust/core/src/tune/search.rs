@@ -28,7 +28,8 @@ pub enum Aim {
     Effort,
     /// Nothing is simulated: the integral gain is made large, so that the integral of the error
     /// after a step disturbance is small. Panagopoulos, Astrom and Hagglund 2002,
-    /// doi 10.1049/ip-cta:20020013.
+    /// doi 10.1049/ip-cta:20020013. Of a law that damps what a disturbance at any frequency causes is
+    /// to be as small, see [`PlantSet::disturbed`].
     Disturbance,
 }
 
@@ -315,7 +316,13 @@ impl Tuning<'_> {
             let found = one.iter().find(|(setting, _)| *setting == Setting::Integral);
             found.map_or(f64::INFINITY, |(_, gain)| 1.0 / gain)
         };
-        let cost = settings.iter().map(integral).fold(0.0, f64::max);
+        let mut cost = settings.iter().map(integral).fold(0.0, f64::max);
+        if let (Aim::Disturbance, Some(all), true) = (self.aim, &controllers, excess <= 1.0) {
+            // That integral is not all where a mode may ring, as one inside of the loop may.
+            let damps = |(_, one): &(_, &Controller<Law>)| matches!(one.feedback, Law::Damped(_));
+            let damped = self.axes.iter().zip(all).filter(damps);
+            cost = damped.map(|(axis, one)| axis.plants.disturbed(one)).fold(cost, f64::max);
+        }
         Tried { settings, controllers, robustness, figures: Vec::new(), excess, cost }
     }
 

@@ -1,7 +1,10 @@
 //! The settings of a controller that a search may change, by their names.
 
+use core::f64::consts::TAU;
+
 use piezotrack_control::{
-    Controller, DisturbanceObserver, Filter, LeadLag, Pid, Repetitive, SlidingMode, Smoothing,
+    Controller, DisturbanceObserver, Filter, IntegralResonantControl, LeadLag, Pid,
+    PositivePositionFeedback, PositiveVelocityPositionFeedback, Repetitive, SlidingMode, Smoothing,
 };
 
 use crate::error::{Error, Result};
@@ -45,6 +48,14 @@ pub enum Setting {
     Switching,
     /// Cutoff of a disturbance observer, Hz.
     Observer,
+    /// Static gain of a damping filter, V/m.
+    Damping,
+    /// Its gain of the velocity, V/m at its frequency.
+    DampingVelocity,
+    /// Its natural frequency, or the cutoff of one of first order, Hz.
+    DampingFrequency,
+    /// Its damping ratio.
+    DampingRatio,
 }
 
 /// Settings with their values.
@@ -63,6 +74,12 @@ pub enum Structure {
     DisturbanceObserver(Nominal),
     /// Disturbance observer around sliding mode.
     PerturbationEstimator(Nominal),
+    /// Integral resonant control around a PID.
+    IntegralResonant,
+    /// Positive position feedback around a PID.
+    PositivePosition,
+    /// Positive velocity and position feedback around a PID.
+    PositiveVelocityPosition,
 }
 
 /// The plant that an observer expects.
@@ -75,7 +92,7 @@ pub struct Nominal {
 }
 
 /// All of them, with the names that both languages use.
-const NAMES: [(&str, Setting); 16] = [
+const NAMES: [(&str, Setting); 20] = [
     ("kp", Setting::Proportional),
     ("ki", Setting::Integral),
     ("kd", Setting::Derivative),
@@ -92,6 +109,10 @@ const NAMES: [(&str, Setting); 16] = [
     ("lag_time", Setting::LagTime),
     ("switching", Setting::Switching),
     ("observer", Setting::Observer),
+    ("damping", Setting::Damping),
+    ("damping_velocity", Setting::DampingVelocity),
+    ("damping_frequency", Setting::DampingFrequency),
+    ("damping_ratio", Setting::DampingRatio),
 ];
 
 impl Setting {
@@ -208,6 +229,8 @@ impl Template {
         let observer = |of: Nominal| {
             DisturbanceObserver::new(of.gain, of.time, value(Setting::Observer)?).ok()
         };
+        let signed = |setting: Setting| Some(self.sign * value(setting)?);
+        let poles = || Some((value(Setting::DampingFrequency)?, value(Setting::DampingRatio)?));
         Some(match self.structure {
             Structure::Pid => Law::Pid(inside()?),
             Structure::LeadLag => {
@@ -221,6 +244,23 @@ impl Template {
             }
             Structure::PerturbationEstimator(of) => {
                 Law::ObservedSlidingMode(observer(of)?.around(sliding()?, dt).ok()?)
+            }
+            Structure::IntegralResonant => {
+                let gain = signed(Setting::Damping)?;
+                let corner = TAU * value(Setting::DampingFrequency)?;
+                let law = IntegralResonantControl::new(gain * corner, 1.0 / gain).ok()?;
+                Law::Damped(law.around(inside()?, dt).ok()?)
+            }
+            Structure::PositivePosition => {
+                let ((wc, zc), gain) = (poles()?, signed(Setting::Damping)?);
+                let law = PositivePositionFeedback::new(gain, wc, zc).ok()?;
+                Law::Damped(law.around(inside()?, dt).ok()?)
+            }
+            Structure::PositiveVelocityPosition => {
+                let ((wc, zc), position) = (poles()?, signed(Setting::Damping)?);
+                let velocity = signed(Setting::DampingVelocity)?;
+                let law = PositiveVelocityPositionFeedback::new(velocity, position, wc, zc).ok()?;
+                Law::Damped(law.around(inside()?, dt).ok()?)
             }
         })
     }

@@ -2,7 +2,8 @@
 
 use piezotrack_control::hysteresis::Dahl;
 use piezotrack_control::{
-    Controller, HysteresisObserved, Observed, Recursion, SampledPid, SampledSlidingMode, StateSpace,
+    Controller, Damped, HysteresisObserved, Observed, Recursion, SampledPid, SampledSlidingMode,
+    StateSpace,
 };
 use piezotrack_core::parts::Law;
 
@@ -46,6 +47,10 @@ fn of_law(law: &Law, out: &mut Named) {
             of_dahl(law, out);
             of_pid(law.inner(), out);
         }
+        Law::Damped(law) => {
+            of_damped(law, out);
+            of_pid(law.inner(), out);
+        }
         Law::None | Law::Scheduled(_) | Law::BoucWenObserver(_) => {}
     }
 }
@@ -62,6 +67,11 @@ fn of_sliding(law: &SampledSlidingMode, out: &mut Named) {
 
 fn of_disturbance<F>(law: &Observed<F>, out: &mut Named) {
     put(out, "disturbance-observer", &law.coefficients());
+}
+
+fn of_damped<F>(law: &Damped<F>, out: &mut Named) {
+    let (b, a) = law.filter().coefficients();
+    put(out, "damping", &[b[0], b[1], b[2], a[0], a[1]]);
 }
 
 fn of_dahl<F>(

@@ -18,6 +18,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyController>()?;
     module.add_function(wrap_pyfunction!(check_part, module)?)?;
     module.add_function(wrap_pyfunction!(law_transfer_function, module)?)?;
+    module.add_function(wrap_pyfunction!(law_reference_numerator, module)?)?;
     module.add_class::<PySession>()
 }
 
@@ -122,6 +123,15 @@ fn check_part(role: &str, part: NamedPart) -> PyResult<()> {
 fn law_transfer_function(law: NamedPart, dt: f64) -> PyResult<[Vec<f64>; 2]> {
     let law = Law::named(&law.0, &law.1, dt).map_err(|error| raise(&error))?;
     Ok(law.transfer_function())
+}
+
+/// Numerator from the reference alone to the same denominator, of a law to which a reading is more
+/// than what is taken off the reference.
+#[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "as Python gives them")]
+fn law_reference_numerator(law: NamedPart, dt: f64) -> PyResult<Option<Vec<f64>>> {
+    let law = Law::named(&law.0, &law.1, dt).map_err(|error| raise(&error))?;
+    Ok(law.reference_numerator())
 }
 
 /// A controller at work.

@@ -37,7 +37,8 @@ def to_control(
     A stage is linearised for small motions as `check_loop` does: at its lowest gain, just after a
     reversal, in the middle, the mean over its settled loop between `limits`, or at its highest.
     Hysteresis and creep are not in it. Of a `Controller` only the feedback law is taken, from the
-    error to the voltage: no feedforward, no repetitive part, no filters, no limits.
+    error to the voltage: no feedforward, no repetitive part, no filters, no limits. A law that damps
+    has the measurement as a second input.
 
     Parameters
     ----------
@@ -192,7 +193,7 @@ def _feedback_law(part: Controller | FeedbackLaw, dt: float | None) -> Any:
         raise ParameterError("dt", "missing", "the sampling interval of the loop in s")
     dt = check_dt(dt)
     control = _control()
-    labels = {"inputs": ["error_m"], "outputs": ["voltage_V"]}
     system = law._linear(dt)
-    made = control.ss if len(system) == 4 else control.tf
-    return control.ss(made(*system, dt), name=law.info.title, **labels)
+    made = (control.ss if len(system) == 4 else control.tf)(*system, dt)
+    inputs = ["error_m", "measured_m"][: made.ninputs]
+    return control.ss(made, name=law.info.title, inputs=inputs, outputs=["voltage_V"])

@@ -3,15 +3,15 @@
 use piezotrack_control::hysteresis::{BoucWen, Dahl};
 use piezotrack_control::unfused::Unfused;
 use piezotrack_control::{
-    Feedback, FeedbackSample, HysteresisObserved, Observed, SampledPid, SampledSlidingMode,
+    Damped, Feedback, FeedbackSample, HysteresisObserved, Observed, SampledPid, SampledSlidingMode,
     ScheduledPid, Snapshot, StateSpace,
 };
 
 use super::hysteresis_observer::AnyObserved;
 use super::state_space::MOST_STATES;
 use super::{
-    disturbance_observer, hysteresis_observer, lead_lag, perturbation_estimator, pid,
-    scheduled_pid, sliding_mode, state_space,
+    disturbance_observer, hysteresis_observer, integral_resonant, lead_lag, perturbation_estimator,
+    pid, positive_position, positive_velocity_position, scheduled_pid, sliding_mode, state_space,
 };
 use crate::design::LinearFeedback;
 use crate::error::{Error, Result};
@@ -133,6 +133,13 @@ macro_rules! laws {
                 }
             }
 
+            fn reference_numerator(&self) -> Option<Vec<f64>> {
+                match self {
+                    Self::None => None,
+                    $(Self::$variant(law) => law.reference_numerator(),)*
+                }
+            }
+
             fn named_gain(&self) -> Option<f64> {
                 match self {
                     Self::None => None,
@@ -160,6 +167,8 @@ laws! {
     DahlObserver(HysteresisObserved<Dahl<Unfused>, SampledPid>): hysteresis_observer;
     /// Observer of a Bouc-Wen hysteresis around a PID.
     BoucWenObserver(HysteresisObserved<BoucWen<Unfused>, SampledPid>):;
+    /// PID with a damping filter of the measurement.
+    Damped(Damped<SampledPid>): integral_resonant, positive_position, positive_velocity_position;
 }
 
 impl From<AnyObserved> for Law {
