@@ -1,7 +1,7 @@
 """Damping of the first mode beside PI and PID: a mode of 160 Hz, damping ratio 0.02, at 5 kHz.
 
-Run as ``python damp_a_mode.py``. All gains follow from the same margins alone (a factor of 2, 0.5 rad,
-Ms of 2), with half a sample of delay. Prints the table of docs/control.md: bandwidth from the
+Run as ``python damp_a_mode.py``. All gains follow from the same margins alone (a factor of 2,
+0.5 rad, Ms of 2), with half a sample of delay. Prints the table of docs/control.md: bandwidth from the
 reference, time until a step of 10 um stays within 2 %, rms error along a triangle of 10 um with
 50 and 100 lines a second, and what 1 nm of sensor noise does to the command at rest.
 """
@@ -38,7 +38,7 @@ class Judged(NamedTuple):
 def stage(mode: float = MODE) -> pt.VirtualStage:
     """Make the stage, 1 um/V with no hysteresis, and a sensor with 1 nm of noise."""
     moves = pt.stages.PrandtlIshlinskiiStage(
-        linear=1e-6, thresholds=[], weights=[], frequency=mode, damping_ratio=0.02
+        linear=1e-6, thresholds=(), weights=(), frequency=mode, damping_ratio=0.02
     )
     return pt.VirtualStage(stage=moves, sensor=pt.stages.Sensor(noise=1e-9, seed=1))
 

@@ -24,7 +24,7 @@ LIMITS = (0.0, 100.0)
 GAIN, MODE, RATIO = 1e-6, 160.0, 0.02
 W0 = 2.0 * math.pi * MODE
 STAGE = pt.stages.PrandtlIshlinskiiStage(
-    linear=GAIN, thresholds=[], weights=[], frequency=MODE, damping_ratio=RATIO
+    linear=GAIN, thresholds=(), weights=(), frequency=MODE, damping_ratio=RATIO
 )
 PI, NOTHING = pt.Pid(kp=1e4, ti=4e-5, tt=DT), pt.Pid(kp=0.0, ti=math.inf)
 
@@ -172,7 +172,7 @@ def test_a_simulated_move_is_that_of_the_linear_loop(name: str) -> None:
     k, k_below, c = sampled(law)
     n, d = plant()
     ys, us, es, cs, ks = ([0.0] * 4 for _ in range(5))
-    expected = []
+    expected: list[float] = []
     for r in run.desired:
         y = -np.dot(d[1:], ys[:3]) + np.dot(n[1:], us[:3])
         ys, es = [y, *ys[:3]], [r - y, *es[:3]]

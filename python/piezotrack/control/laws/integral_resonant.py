@@ -53,7 +53,7 @@ class IntegralResonantControl(DampingLaw):
     ...     pid=pt.Pid(kp=2e4, ti=2e-4), gain=cutoff / d, feedthrough=d
     ... )
     >>> stage = pt.stages.PrandtlIshlinskiiStage(
-    ...     linear=1e-6, thresholds=[], weights=[], frequency=160.0, damping_ratio=0.02
+    ...     linear=1e-6, thresholds=(), weights=(), frequency=160.0, damping_ratio=0.02
     ... )
     >>> loop = pt.Controller(dt=2e-4, limits=(0.0, 100.0), feedback=law)
     >>> pt.check_loop(stage, loop, delay=1e-4).stable

@@ -20,9 +20,9 @@ class PositivePositionFeedback(DampingLaw):
         u_{FB} = C_{PID}\,(r - y) + K\,(y - y_0), \qquad
         K(s) = \frac{g\,\omega_c^2}{s^2 + 2 \zeta_c \omega_c s + \omega_c^2}
 
-    Fanson and Caughey 1990, doi 10.2514/3.10451. K is sampled by Tustin's rule, counts from the first
-    reading, and rolls off above the mode: of the three damping laws this one adds least noise.
-    Start, antiwindup, `check_loop` and `to_control` are those of `IntegralResonantControl`.
+    Fanson and Caughey 1990, doi 10.2514/3.10451. K is sampled by Tustin's rule, counts from the
+    first reading, and rolls off above the mode. Start, antiwindup, `check_loop` and `to_control`
+    are those of `IntegralResonantControl`.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class PositivePositionFeedback(DampingLaw):
     ...     pid=pt.Pid(kp=2e4, ti=2e-4), gain=0.4e6, frequency=200.0, damping_ratio=0.5
     ... )
     >>> stage = pt.stages.PrandtlIshlinskiiStage(
-    ...     linear=1e-6, thresholds=[], weights=[], frequency=160.0, damping_ratio=0.02
+    ...     linear=1e-6, thresholds=(), weights=(), frequency=160.0, damping_ratio=0.02
     ... )
     >>> loop = pt.Controller(dt=2e-4, limits=(0.0, 100.0), feedback=law)
     >>> pt.check_loop(stage, loop, delay=1e-4).stable

@@ -22,9 +22,9 @@ class PositiveVelocityPositionFeedback(DampingLaw):
 
     Bhikkaji, Ratnam, Fleming and Moheimani 2007, High-performance control of piezoelectric tube
     scanners, IEEE Transactions on Control Systems Technology 15, whose gains are ``g1 wc`` and
-    ``g2 wc^2``. The four numbers of K put the four poles of a mode with the filter anywhere. Without
-    the velocity it is `PositivePositionFeedback`. K is sampled by Tustin's rule, and counts from
-    the first reading. Start, antiwindup, `check_loop` and `to_control` are those of
+    ``g2 wc^2``. The four numbers of K put the four poles of a mode with the filter anywhere.
+    Without the velocity it is `PositivePositionFeedback`. K is sampled by Tustin's rule, and counts
+    from the first reading. Start, antiwindup, `check_loop` and `to_control` are those of
     `IntegralResonantControl`.
 
     Parameters
@@ -56,7 +56,7 @@ class PositiveVelocityPositionFeedback(DampingLaw):
     ...     damping_ratio=0.6,
     ... )
     >>> stage = pt.stages.PrandtlIshlinskiiStage(
-    ...     linear=1e-6, thresholds=[], weights=[], frequency=160.0, damping_ratio=0.02
+    ...     linear=1e-6, thresholds=(), weights=(), frequency=160.0, damping_ratio=0.02
     ... )
     >>> loop = pt.Controller(dt=2e-4, limits=(0.0, 100.0), feedback=law)
     >>> pt.check_loop(stage, loop, delay=1e-4).stable

@@ -37,8 +37,8 @@ def to_control(
     A stage is linearised for small motions as `check_loop` does: at its lowest gain, just after a
     reversal, in the middle, the mean over its settled loop between `limits`, or at its highest.
     Hysteresis and creep are not in it. Of a `Controller` only the feedback law is taken, from the
-    error to the voltage: no feedforward, no repetitive part, no filters, no limits. A law that damps
-    has the measurement as a second input.
+    error to the voltage: no feedforward, no repetitive part, no filters, no limits. A law that
+    damps has the measurement as a second input.
 
     Parameters
     ----------
