@@ -1,8 +1,8 @@
 """Damping of the first mode beside PI and PID: a mode of 160 Hz, damping ratio 0.02, at 5 kHz.
 
 Run as ``python damp_a_mode.py``. All gains follow from the same margins alone (a factor of 2,
-0.5 rad, Ms of 2), with half a sample of delay. Prints the table of docs/control.md: bandwidth from the
-reference, time until a step of 10 um stays within 2 %, rms error along a triangle of 10 um with
+0.5 rad, Ms of 2), with half a sample of delay. Prints the table of docs/control.md: bandwidth from
+the reference, time until a step of 10 um stays within 2 %, rms error along a triangle of 10 um with
 50 and 100 lines a second, and what 1 nm of sensor noise does to the command at rest.
 """
 
