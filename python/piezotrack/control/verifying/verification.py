@@ -112,7 +112,8 @@ class Verification(Result):
     def verdict(self) -> Verdict:
         """Whether the sensitivity is within its bound at all lines, beyond it at one, or neither.
 
-        A line is beyond where its whole band is; the band is that of 95 % for all lines at once.
+        A line is beyond where its whole band is; the band is that of 95 % for all lines at once. A
+        mode narrower than the distance of the lines may be missed between them.
         """
         largest, least = self._beyond()
         if (least > self.bound).any():

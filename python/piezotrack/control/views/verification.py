@@ -74,9 +74,10 @@ def verification_text(found: Verification) -> str:
 
 
 def _where(found: Verification) -> str:
-    """Write the frequencies at which the bound is or may be exceeded."""
+    """Write the distance of the lines, or those at which the bound is or may be exceeded."""
     if found.verdict == "holds":
-        return ""
+        apart = float(np.median(np.diff(found.sensitivity.frequency)))
+        return f", at lines {apart:.3g} Hz apart"
     listed = ", ".join(f"{f:.4g}" for f in found.beyond[:LISTED])
     more = f" and {found.beyond.size - LISTED} more" if found.beyond.size > LISTED else ""
     remedy = ": more periods, realisations or amplitude narrow them"
