@@ -205,3 +205,24 @@ def _law(loop: pt.Controller, found: pt.control.Verification) -> Any:
     law, q = loop.feedback, 1.0 - np.exp(-2j * np.pi * found.sensitivity.frequency * loop.dt)
     assert isinstance(law, pt.Pid)
     return law.kp * (1.0 + loop.dt / law.ti / q + law.td / loop.dt * q)
+
+
+def test_a_law_that_damps_is_verified_at_the_command() -> None:
+    # The loop opened there is P (C - K); a reference alone would not show it.
+    ringing = replace(MODE, damping_ratio=0.02)
+    virtual = pt.VirtualStage.of(ringing, noise=1e-9, delay=1e-4, limits=LIMITS)
+    law = pt.control.PositivePositionFeedback(
+        pid=pt.Pid(kp=6e5, ti=2.4e-3), gain=8e5, frequency=300.0, damping_ratio=0.6
+    )
+    loop = pt.Controller(dt=2e-4, limits=LIMITS, feedback=law)
+    lines = pt.RandomPhaseMultisine(band=(8.0, 2000.0), low=-0.2, high=0.2)
+    found = pt.verify(virtual, loop, lines, level=LEVEL)
+    assert found.predicted is not None
+    inside = np.abs(found.sensitivity.value - found.predicted[1]) <= found.sensitivity.band()
+    assert inside.mean() > 0.9
+    w = 2j * np.pi * found.sensitivity.frequency
+    k = 8e5 * 600.0**2 * np.pi**2 / (w * w + 1.2 * 600.0 * np.pi * w + 600.0**2 * np.pi**2)
+    difference = 6e5 * (1.0 + 1.0 / (2.4e-3 * w)) - k
+    # The laws are sampled: as in continuous time at low frequencies.
+    slow = found.sensitivity.frequency < 200.0
+    assert found.feedback.value[slow] == pytest.approx(difference[slow], abs=0.05 * 8e5)
