@@ -171,6 +171,23 @@ def test_a_law_is_not_worse_than_the_one_inside_of_it(
     assert errors[0] < 1.01 * errors[1]
 
 
+@pytest.mark.slow
+def test_a_notch_from_margins_alone_does_not_depend_on_the_seed() -> None:
+    mode = pt.PrandtlIshlinskiiStage(
+        linear=1e-6, thresholds=(), weights=(), frequency=160.0, damping_ratio=0.05
+    )
+    stage = pt.VirtualStage.of(mode, delay=2e-4)
+    found = []
+    for seed in range(4):
+        search = pt.TuningSearch(seed=seed)
+        tuned = pt.tune(stage, dt=5e-4, limits=(0.0, 75.0), parts=("pid", "notch"), search=search)
+        law = tuned.controller.feedback
+        assert isinstance(law, pt.Pid)
+        found.append(law.kp / law.ti)
+    # It was 18 % apart without starts at the mode.
+    assert max(found) < 1.03 * min(found)
+
+
 def test_the_same_bits_for_any_number_of_threads() -> None:
     stage, reference = published_stage(), motion(7.5)
     tuned = [

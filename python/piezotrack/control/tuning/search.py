@@ -15,7 +15,7 @@ from .box import box_of, resonance
 from .goal import Goal
 from .margins import NamedPlant, plants_of
 from .model_set.searched import AxisSearch, SearchedSet
-from .starts import damped, simc
+from .starts import cancelled, damped, simc
 from .structures import SOUGHT, damps, gains_of
 from .tuned import MarginReport
 
@@ -175,17 +175,18 @@ def _entered(problem: TuningProblem, models: SearchedSet, solution: Solution) ->
 
 
 def _rules(problem: TuningProblem, models: SearchedSet) -> list[list[float]]:
-    """Gains of the tuning rule: along references, or with the filter of a law that damps."""
+    """Gains of the tuning rule: along references, beside a notch, and with a filter that damps."""
     filtered = damps(problem.law)
-    if "ki" not in SOUGHT[problem.law] or not (models.follows or filtered):
+    settings = [[name for name, *_ in axis.box.ranges] for axis in models.axes]
+    notched = not models.follows and all("notch_depth" in names for names in settings)
+    if "ki" not in SOUGHT[problem.law] or not (models.follows or filtered or notched):
         return []
 
     def of(axis: AxisSearch) -> list[dict[str, float]]:
         plants = [one.plant for one in axis.plants]
-        if not filtered:
-            return simc(plants, axis.base.dt)
-        modes = resonance(plants, axis.base.dt)
-        return damped(problem.law, plants, modes, axis.base.dt)
+        modes, dt = resonance(plants, axis.base.dt), axis.base.dt
+        found = damped(problem.law, plants, modes, dt) if filtered else simc(plants, dt)
+        return found if modes is None or not notched else [*found, *cancelled(found, modes)]
 
     return [models.place(gains) for gains in zip(*map(of, models.axes), strict=True)]
 

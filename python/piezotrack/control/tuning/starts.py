@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from ... import _core
 
-__all__ = ["damped", "place_of", "simc"]
+__all__ = ["cancelled", "damped", "place_of", "simc"]
 
 # Places of settings of which a start says nothing: as if the part were not there.
 ABSENT = {
@@ -27,6 +27,8 @@ ABSENT = {
 SHARES = (1.0, 0.5, 0.25, 0.125)
 # Damping ratio of a mode with its filter of second order.
 WANTED = 0.4
+# Width of a notch that leaves two lags in the place of a mode, and damping ratios of modes.
+WIDTH, DAMPINGS = 2.0, (0.01, 0.03, 0.1)
 
 
 def simc(plants: Sequence[_core.LoopPlant], dt: float) -> list[dict[str, float]]:
@@ -99,6 +101,31 @@ def damped(
     slow = [{name: one / 4.0 for name, one in gains.items()} for gains in simc(plants, dt)]
     least = {**damping, "damping": 1e-4 / largest}
     return [gains | filters for gains in (*simc(plants, dt), *slow) for filters in (damping, least)]
+
+
+def cancelled(
+    gains: Sequence[dict[str, float]], modes: tuple[float, float]
+) -> list[dict[str, float]]:
+    """Add a wide notch at a mode to some gains, with the depths that cancel usual dampings of it.
+
+    Parameters
+    ----------
+    gains : sequence of dict
+        Settings by name.
+    modes : (float, float)
+        Lowest and highest frequency of the modes that ring [Hz].
+
+    Returns
+    -------
+    list of dict
+        Settings by name.
+    """
+    middle = math.sqrt(modes[0] * modes[1])
+    notches = [
+        {"notch_frequency": middle, "notch_width": WIDTH, "notch_depth": 2.0 * ratio / WIDTH}
+        for ratio in DAMPINGS
+    ]
+    return [one | notch for one in gains for notch in notches]
 
 
 def place_of(
