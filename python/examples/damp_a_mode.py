@@ -3,7 +3,8 @@
 Run as ``python damp_a_mode.py``. All gains follow from the same margins alone (a factor of 2,
 0.5 rad, Ms of 2), with half a sample of delay. Prints the table of docs/control.md: bandwidth from
 the reference, time until a step of 10 um stays within 2 %, rms error along a triangle of 10 um with
-50 and 100 lines a second, and what 1 nm of sensor noise does to the command at rest.
+50 and 100 lines a second, and what 1 nm of sensor noise does to the command at rest. Writes
+damped.png, two periods of that triangle with each law.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import piezotrack as pt
 
@@ -26,13 +28,14 @@ LAWS = {
 
 
 class Judged(NamedTuple):
-    """Bandwidth [Hz], settling [s], rms errors [m] and change of the command at rest [V rms]."""
+    """Bandwidth [Hz], settling [s], rms errors [m], change of the command at rest [V rms], run."""
 
     bandwidth: float
     settling: float
     error: float
     fast_error: float
     change: float
+    lines: pt.control.Tracking
 
 
 def stage(mode: float = MODE) -> pt.VirtualStage:
@@ -66,21 +69,39 @@ def judged(controller: pt.Controller) -> Judged:
         error=runs[1].metrics.rms_error,
         fast_error=runs[2].metrics.rms_error,
         change=float(np.sqrt(np.mean(change**2))),
+        lines=runs[1],
     )
 
 
+def plotted(runs: dict[str, pt.control.Tracking]) -> Figure:
+    """Draw two periods of the triangle with each law."""
+    figure = Figure(figsize=(7.6, 3.6), layout="constrained")
+    ax = figure.subplots()
+    for (name, run), dash in zip(runs.items(), ("-.", ":", "--", "-", (0, (5, 1))), strict=True):
+        shown = (run.t > 0.6) & (run.t < 0.68)
+        ax.plot(1e3 * run.t[shown], 1e6 * run.displacement[shown], linestyle=dash, label=name)
+    ax.plot(1e3 * run.t[shown], 1e6 * run.desired[shown], "k", linewidth=0.8, label="desired")
+    ax.set(xlabel="time [ms]", ylabel="displacement [um]")
+    ax.margins(x=0.0)
+    figure.legend(loc="outside right center", frameon=False)
+    return figure
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the table, and draw the motion."""
+    runs = {}
     print("| law | bandwidth | settling | 50 lines/s | 100 lines/s | noise of the command |")
     print("| --- | --- | --- | --- | --- | --- |")
     for name, law in LAWS.items():
         one = judged(tuned(law))
+        runs[name] = one.lines
         print(
             f"| {name} | {one.bandwidth:.3g} Hz | {1e3 * one.settling:.1f} ms "
             f"| {1e6 * one.error:.3f} µm | {1e6 * one.fast_error:.3f} µm "
             f"| {1e3 * one.change:.2f} mV |",
             flush=True,
         )
+    plotted(runs).savefig("damped.png", dpi=150)
 
 
 if __name__ == "__main__":

@@ -12,18 +12,18 @@ from .controller.load import load_controller as load_controller
 from .controller.session import Command as Command
 from .controller.session import RefusedReadings as RefusedReadings
 from .controller.session import Session as Session
+from .laws.damping.integral_resonant import IntegralResonantControl as IntegralResonantControl
+from .laws.damping.positive_position import PositivePositionFeedback as PositivePositionFeedback
+from .laws.damping.positive_velocity_position import (
+    PositiveVelocityPositionFeedback as PositiveVelocityPositionFeedback,
+)
 from .laws.disturbance_observer import DisturbanceObserver as DisturbanceObserver
 from .laws.hysteresis_observer import HysteresisObserver as HysteresisObserver
-from .laws.integral_resonant import IntegralResonantControl as IntegralResonantControl
 from .laws.lead_lag import LeadLag as LeadLag
 from .laws.neural_network import NetworkInverse as NetworkInverse
 from .laws.neural_network import train_network as train_network
 from .laws.perturbation_estimator import PerturbationEstimator as PerturbationEstimator
 from .laws.pid import Pid as Pid
-from .laws.positive_position import PositivePositionFeedback as PositivePositionFeedback
-from .laws.positive_velocity_position import (
-    PositiveVelocityPositionFeedback as PositiveVelocityPositionFeedback,
-)
 from .laws.scheduled_pid import ScheduledPid as ScheduledPid
 from .laws.sliding_mode import SlidingMode as SlidingMode
 from .laws.state_space import StateSpace as StateSpace

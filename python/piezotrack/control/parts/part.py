@@ -24,6 +24,9 @@ __all__ = ["FeedbackLaw", "Part", "flat", "in_powers_of_z", "part", "part_class"
 REGISTERED: dict[str, type[Part]] = {}
 # Modules with several parts, by their role; a law has a module of its own.
 MODULES = {"filter": ".filters", "repetitive": ".repetitive", "smoothing": ".repetitive"}
+# Laws that share a folder.
+DAMPING = ("integral-resonant", "positive-position", "positive-velocity-position")
+FOLDERS = dict.fromkeys(DAMPING, "damping.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +119,7 @@ def part_class(name: str) -> type[Part]:
         The class.
     """
     if name not in REGISTERED:
-        module = f"..laws.{name.replace('-', '_')}"
+        module = f"..laws.{FOLDERS.get(name, '')}{name.replace('-', '_')}"
         import_module(MODULES.get(LISTED[name].role, module), __package__)
     return REGISTERED[name]
 

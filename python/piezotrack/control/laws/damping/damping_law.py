@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ... import _core
-from ..._support.arguments import expect
-from ..parts.part import FeedbackLaw, in_powers_of_z
-from .pid import Pid
+from .... import _core
+from ...._support.arguments import expect
+from ...parts.part import FeedbackLaw, in_powers_of_z
+from ..pid import Pid
 
 __all__ = ["DampingLaw"]
 

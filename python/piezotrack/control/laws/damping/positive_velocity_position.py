@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..parts.part import part
-from .damping import DampingLaw
+from ...parts.part import part
+from .damping_law import DampingLaw
 
 __all__ = ["PositiveVelocityPositionFeedback"]
 

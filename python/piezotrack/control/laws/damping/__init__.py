@@ -1,0 +1,1 @@
+"""Laws that damp the first mode by a filter of the measurement."""
