@@ -73,9 +73,9 @@ from .references.waveforms import staircase as staircase
 from .references.waveforms import triangle as triangle
 from .references.xy_reference import XYReference as XYReference
 from .response.excitation import RandomPhaseMultisine as RandomPhaseMultisine
-from .response.frequency_response import FrequencyResponse as FrequencyResponse
 from .response.measuring import frequency_response as frequency_response
 from .response.modal_fit import fit_modes as fit_modes
+from .response.response_data import FrequencyResponse as FrequencyResponse
 from .response.response_file import load_response as load_response
 from .stages.feedback.bouc_wen_oscillator import BoucWenOscillator as BoucWenOscillator
 from .stages.feedback.dahl import DahlStage as DahlStage

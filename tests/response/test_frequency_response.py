@@ -202,6 +202,14 @@ def test_a_chirp_gives_the_response_with_coherence() -> None:
     assert 0.88 <= inside.mean() <= 1.0
 
 
+def test_a_drive_that_begins_with_a_ramp_repeats_after_it() -> None:
+    device = pt.hardware.VirtualDevice(modal(noise=1e-9), limits=(0.0, 75.0))
+    log = pt.measure(device, "multisine:5/15/35/95Hz,28..32V,2s", rate=RATE)
+    found = pt.frequency_response(log)
+    assert found.frequency == pytest.approx([5.0, 15.0, 35.0, 95.0])
+    assert found.value == pytest.approx(true_response(found.frequency), rel=2e-3)
+
+
 def test_hysteresis_makes_the_gain_depend_on_the_amplitude() -> None:
     def gain(size: float) -> float:
         lines = replace(LINES, band=(8.0, 80.0), low=30.0 - size, high=30.0 + size)
@@ -265,6 +273,8 @@ def test_a_file_has_every_bit_and_others_are_refused(tmp_path: Path) -> None:
         ({"shape": [(10.0, 0.0)]}, "shape"),
         ({"high": 80.0}, "limits"),
         ({"lines": "even"}, "lines"),
+        ({"resolution": 1e-5}, "samples in all"),
+        ({"realisations": 10_000, "periods": 10_000}, "samples in all"),
     ],
 )
 def test_what_cannot_be_measured_is_refused_before_the_output_moves(

@@ -23,6 +23,8 @@ __all__ = ["RandomPhaseMultisine", "parse_excitation"]
 
 # Most periods and realisations.
 MOST = 10_000
+# Most samples of all of them.
+MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +145,7 @@ class RandomPhaseMultisine:
         Raises
         ------
         ParameterError
-            The band is beyond half the rate.
+            The band is beyond half the rate, or there are more than ten million samples in all.
         """
         if not self.band[1] < 0.5 * rate:
             raise ParameterError(
@@ -152,7 +154,16 @@ class RandomPhaseMultisine:
                 f"below half the sampling rate, {plain(0.5 * rate)} Hz",
                 verb="goes",
             )
-        return max(4, round(rate / self.spacing))
+        count = max(4, round(rate / self.spacing))
+        total = count * self.realisations * (self.settle + self.periods)
+        if total > MOST_SAMPLES:
+            raise ParameterError(
+                "resolution",
+                f"{self.spacing:g} Hz",
+                f"one with at most {MOST_SAMPLES} samples in all periods and realisations, not "
+                f"{total:.3g}",
+            )
+        return count
 
     def numbers(self, rate: float) -> NDArray[np.intp]:
         """Return the multiples of f0 that are excited.

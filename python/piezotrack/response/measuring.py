@@ -18,9 +18,9 @@ from ..stages.base import Stage
 from ..stages.virtual import VirtualStage
 from .best_linear_approximation import approximate, spectra
 from .excitation import RandomPhaseMultisine
-from .frequency_response import FrequencyResponse
 from .nonperiodic import from_nonperiodic
 from .periods import period_of
+from .response_data import FrequencyResponse
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +33,8 @@ __all__ = ["frequency_response"]
 
 # Ratio to the largest of the amplitude at a line of a log below which it is not excited.
 EXCITED = 1e-3
+# Parts of a log, up to its end, in which a period is sought.
+SHARES = (1.0, 0.75, 0.5)
 
 
 def frequency_response(
@@ -178,15 +180,20 @@ def _of_logs(logs: list[Any], period: float | None, resolution: float | None) ->
                 verb="has",
             )
         _check_moves(log, f"log {k}")
-    counts = {
-        period_of(log, None if period is None else positive("period", period, "s")) for log in logs
-    }
+    given = None if period is None else positive("period", period, "s")
+    # A drive may begin with a ramp.
+    for share in SHARES if given is None else (1.0,):
+        ends = [log[log.t[round((1.0 - share) * (len(log) - 1))] :] for log in logs]
+        counts = {period_of(log, given) for log in ends}
+        if counts != {None}:
+            break
     if len(counts) > 1:
         known = ", ".join("none" if n is None else f"{n * first.dt:.6g} s" for n in counts)
         raise ParameterError("source", f"periods of {known}", "one period in all logs", verb="has")
     (count,) = counts
     if count is None:
         return from_nonperiodic(logs, resolution)
+    logs = ends
     _refuse({"resolution": resolution}, "of a log that repeats")
     lines = _excited(logs, count)
     periods = min(len(log) for log in logs) // count

@@ -15,7 +15,7 @@ from .._support.files.writing import write_result
 from ..errors import DataError, ParameterError
 from ..stages.plays.prandtl_ishlinskii import PrandtlIshlinskiiStage
 from ..stages.virtual import VirtualStage
-from .frequency_response import FrequencyResponse
+from .response_data import FrequencyResponse
 
 if TYPE_CHECKING:
     import os

@@ -8,7 +8,7 @@ import numpy as np
 
 from .._support.arguments import hertz
 from ..errors import ParameterError
-from .frequency_response import FrequencyResponse
+from .response_data import FrequencyResponse
 
 if TYPE_CHECKING:
     from ..data.dataset import Dataset

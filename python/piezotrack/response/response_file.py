@@ -10,7 +10,7 @@ from .. import _core
 from .._support.messages import quoted
 from ..errors import ParameterError
 from ..identification.fitted.model_file import checked_content, entries_of
-from .frequency_response import FORMAT, SCHEMA_VERSION, FrequencyResponse
+from .response_data import FORMAT, SCHEMA_VERSION, FrequencyResponse
 
 if TYPE_CHECKING:
     import os

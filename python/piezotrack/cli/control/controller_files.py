@@ -11,7 +11,7 @@ from .loop_options import PAPER, check_same_drive, known_model
 if TYPE_CHECKING:
     from ...control.controller.controller import Controller
     from ...identification.fitted.identified_model import IdentifiedModel
-    from ...response.frequency_response import FrequencyResponse
+    from ...response.response_data import FrequencyResponse
     from ...stages.virtual import VirtualStage
     from .loop_options import Simulation
 
@@ -33,7 +33,7 @@ def controller_in(file: Path) -> Controller | None:
 def response_in(file: Path) -> FrequencyResponse | None:
     """Load a frequency response, or return None where the file is another."""
     from ...identification.fitted.model_file import read_content
-    from ...response.frequency_response import FORMAT
+    from ...response.response_data import FORMAT
     from ...response.response_file import load_response
 
     _, document = read_content(file)

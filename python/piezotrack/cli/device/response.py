@@ -9,12 +9,16 @@ from ...errors import ParameterError
 from ..command import Argument, Option, command, refuse_without_effect
 from ..connection import connected
 from ..option_groups import LogOptions
-from ..options import OnDevice, Rest, of_file
+from ..options import OnDevice, Rest, Window, cut, of_file
 from ..output import Output
 from ..values import FREQUENCY, TIME
 
 if TYPE_CHECKING:
-    from ...response.frequency_response import FrequencyResponse
+    from typing import TypeAlias
+
+    from ...response.response_data import FrequencyResponse
+
+    Span: TypeAlias = tuple[float | None, float | None]
 
 __all__ = ["response_command"]
 
@@ -27,6 +31,7 @@ def response_command(
             "Excitation of a device, random-phase:1..400Hz,30..35V; or logs", "EXCITATION|FILE"
         ),
     ],
+    window: Window = None,
     device: OnDevice = None,
     rest: Rest = None,
     *,
@@ -49,15 +54,19 @@ def response_command(
 
     output.will_write(["response.csv", "response.json", *picture_files("response")])
     if device is None:
-        found = _of_logs(source, reading, period, resolution)
+        found = _of_logs(source, window, reading, period, resolution)
     else:
-        refuse_without_effect(["period", "resolution"], "with --device")
+        refuse_without_effect(["window", "period", "resolution"], "with --device")
         found = _measured(source, device, reading.rate, rest)
     output.show(found.summary(), found.document(), output.write(found.save))
 
 
 def _of_logs(
-    source: list[str], reading: LogOptions, period: float | None, resolution: float | None
+    source: list[str],
+    window: Span | None,
+    reading: LogOptions,
+    period: float | None,
+    resolution: float | None,
 ) -> FrequencyResponse:
     from ...response.measuring import frequency_response
 
@@ -65,7 +74,7 @@ def _of_logs(
     files = [Path(one) for one in source]
     if source[0].startswith("random-phase:"):
         raise ParameterError("--device", "missing", "a device that the excitation is played on")
-    logs = [reading.log(file) for file in files]
+    logs = [cut(reading.log(file), file, window) for file in files]
     with of_file(files[0]):
         return frequency_response(logs, period=period, resolution=resolution)
 

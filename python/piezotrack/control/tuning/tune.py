@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 from ...references.reference import Reference
-from ...response.frequency_response import FrequencyResponse
+from ...response.response_data import FrequencyResponse
 from ..loop.contouring import contour
 from ..loop.stability import check_loop
 from ..running.track import track

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from ...response.frequency_response import FrequencyResponse
+    from ...response.response_data import FrequencyResponse
     from ..controller.controller import Controller
     from ..loop.tracking import Tracking
 

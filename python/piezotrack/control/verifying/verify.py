@@ -14,8 +14,8 @@ from ...hardware.device import Device
 from ...references.reference import Reference
 from ...response.best_linear_approximation import approximate, spectra
 from ...response.excitation import RandomPhaseMultisine
-from ...response.frequency_response import FrequencyResponse
 from ...response.modal_fit import fit_modes
+from ...response.response_data import FrequencyResponse
 from ..controller.controller import Controller
 from ..loop.preconditions import check_drive_unit
 from ..loop.run import Run

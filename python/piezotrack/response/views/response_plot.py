@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...stages.base import Stage
-    from ..frequency_response import FrequencyResponse
+    from ..response_data import FrequencyResponse
     from ..modal_fit import ModalFit
 
     Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from ..._support.units import drive_text
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..frequency_response import FrequencyResponse
+    from ..response_data import FrequencyResponse
 
     Array = NDArray[np.float64]
 
