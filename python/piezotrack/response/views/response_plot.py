@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...stages.base import Stage
-    from ..response_data import FrequencyResponse
     from ..modal_fit import ModalFit
+    from ..response_data import FrequencyResponse
 
     Array = NDArray[np.float64]
 
