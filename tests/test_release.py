@@ -40,6 +40,23 @@ def test_the_citation_and_the_changelog_have_the_version_and_one_date() -> None:
     assert f"\nversion: {VERSION}\ndate-released: {newest[2]}\n" in citation
 
 
+def test_the_recipe_has_the_version_and_the_dependencies_of_the_package() -> None:
+    recipe = (ROOT / "packaging" / "conda" / "recipe.yaml").read_text(encoding="utf-8")
+    assert f'\n  version: "{VERSION}"\n' in recipe
+    project = toml("pyproject.toml")
+    run = recipe.partition("  run:\n")[2].partition("\n\n")[0]
+    listed = {line.strip(" -").replace(" ", "") for line in run.splitlines()}
+    # Without its programs with windows, which conda packs apart.
+    needed = {
+        one.replace("matplotlib", "matplotlib-base") for one in project["project"]["dependencies"]
+    }
+    assert listed == {*needed, f"python{project['project']['requires-python']}"}
+    assert f"maturin {project['build-system']['requires'][0].removeprefix('maturin')}" in recipe
+    assert set(
+        re.findall(r"^    - (\S+)$", recipe.partition("license_file:")[2], re.MULTILINE)
+    ) == set(project["project"]["license-files"])
+
+
 def test_each_kind_of_device_has_an_extra_and_what_imports_nothing_installs_nothing() -> None:
     """`pip install 'piezotrack[gcs]'` is what somebody types who has such a controller."""
     extras = toml("pyproject.toml")["project"]["optional-dependencies"]

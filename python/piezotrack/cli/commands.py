@@ -24,6 +24,7 @@ HEADINGS = {
     "control": ("simulate", "feedforward", "track", "tune", "verify", "learn", "contour", "export"),
     "device": ("measure", "response", "play", "serve"),
     "app": ("app",),
+    "installation": ("doctor",),
     "research": ("demo", "compare-controllers", "benchmark", "reproduce"),
 }
 COMMANDS = {name: heading for heading, names in HEADINGS.items() for name in names}

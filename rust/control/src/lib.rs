@@ -36,6 +36,11 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 
+// The example of the page on crates.io runs among the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod back_calculation;
 pub mod controller;
 pub mod creep;

@@ -11,7 +11,7 @@ mod tune;
 use pyo3::prelude::*;
 
 /// The compiled core of piezotrack.
-#[pymodule]
+#[pymodule(gil_used = false)]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     conversions::numbers::register(module)?;

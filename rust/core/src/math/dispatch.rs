@@ -2,6 +2,20 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
+/// Returns the name of the vector instructions that searches use on this processor.
+#[must_use]
+pub fn instruction_set() -> &'static str {
+    match Arch::new() {
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        Arch::V4(_) => "AVX-512",
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        Arch::V3(_) => "AVX2",
+        #[cfg(target_arch = "aarch64")]
+        Arch::Neon(_) => "NEON",
+        _ => "none",
+    }
+}
+
 /// Lanes in one vector of an instruction set.
 pub(crate) fn width(arch: Arch) -> usize {
     struct Width;

@@ -12,6 +12,7 @@ mod threads;
 mod transfer_function;
 
 pub use bounded_least_squares::{FREE, NOT_NEGATIVE, bounded, bounded_rows};
+pub use dispatch::instruction_set;
 pub use lanes::Lanes;
 pub use memory::{available, room, zeros};
 pub use rows::Rows;

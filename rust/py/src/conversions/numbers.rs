@@ -14,6 +14,7 @@ pub const MOST_SAMPLES: usize = 500_000_000;
 pub const LARGEST: f64 = 1e100;
 
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("INSTRUCTION_SET", piezotrack_core::math::instruction_set())?;
     module.add("INTERVALS", piezotrack_core::signal::INTERVALS)?;
     module.add("LARGEST", LARGEST)?;
     module.add("MOST_SAMPLES", MOST_SAMPLES)?;
