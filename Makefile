@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak studies fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs crate-docs architecture pictures notices c-library c-header c-header-test sentences clean
+.PHONY: help demo reproduce benchmark test soak studies fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs links crate-docs architecture pictures notices c-library c-package c-header c-header-test sentences public-names release-check clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -89,6 +89,13 @@ python-test: $(VENV)/installed $(VENV)/tools c-library ## Tests of the package, 
 c-library: $(VENV)/pip ## The C library: target/release/libpiezotrack.a and .so; header in rust/capi/include
 	PYO3_PYTHON="$(CURDIR)/$(BIN)/python" cargo build --locked --release -p piezotrack-capi -p piezotrack-py
 
+# With the licences of what is in it.
+c-package: c-library ## The C library to hand on, header and licences beside it: target/piezotrack-c.tar.gz
+	rm -rf target/piezotrack-c && mkdir -p target/piezotrack-c
+	cp rust/capi/include/piezotrack.h target/release/libpiezotrack.* LICENSE-* THIRD-PARTY.txt target/piezotrack-c
+	rm -f target/piezotrack-c/*.d
+	tar -czf target/piezotrack-c.tar.gz -C target piezotrack-c
+
 c-header: ## Write rust/capi/include/piezotrack.h from the functions of the C library
 	WRITE=1 $(MAKE) --no-print-directory c-header-test
 
@@ -101,6 +108,9 @@ bench: ## Criterion benches: throughput of the swarm, latency of a step
 # Warnings end the build: dead links, pages without a place, public names without an entry.
 docs: $(VENV)/installed $(VENV)/site-tools ## The site: target/site/index.html; pages, reference, gallery
 	$(BIN)/sphinx-build -q -W --keep-going -j auto -d target/site-cache docs target/site
+
+links: $(VENV)/installed $(VENV)/site-tools ## Look for links of the site that lead nowhere: needs a network
+	$(BIN)/sphinx-build -q -b linkcheck -j auto -d target/site-cache docs target/links
 
 crate-docs: ## The crates' pages: target/doc
 	cargo doc --locked --no-deps
@@ -118,6 +128,12 @@ sentences: $(VENV)/pip ## All sentences that the program prints, to be read: tar
 
 notices: ## Write THIRD-PARTY.txt: the licences of the crates that are linked in
 	$(PYTHON) docs/make_notices.py
+
+public-names: $(VENV)/installed $(VENV)/tools ## Write tests/public_names.txt: what is public, with its arguments
+	PYTHONPATH=tests/helpers:docs/extensions $(BIN)/python tests/helpers/public_names.py
+
+release-check: $(VENV)/installed $(VENV)/tools $(VENV)/release-tools ## All of a release but the uploads, with a table: done, not possible here, why
+	$(BIN)/python .ci/release_check.py $(ONLY)
 
 clean: ## Remove what was built, not your results
 	rm -rf $(VENV) target demo report docs/gallery docs/reference
@@ -143,6 +159,10 @@ $(VENV)/installed: $(WHEELS)/built
 
 $(VENV)/tools: $(VENV)/pip pyproject.toml
 	$(BIN)/python -m pip install --quiet --group test
+	@touch $@
+
+$(VENV)/release-tools: $(VENV)/pip pyproject.toml
+	$(BIN)/python -m pip install --quiet --group release
 	@touch $@
 
 $(VENV)/site-tools: $(VENV)/pip pyproject.toml
