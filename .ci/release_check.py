@@ -49,7 +49,7 @@ def run(*command: object, cwd: Path = ROOT, env: dict[str, str] | None = None) -
     )
     if done.returncode:
         lines = (done.stdout + done.stderr).strip().splitlines()
-        raise AssertionError(f"{command[0]} ended with {done.returncode}: {' | '.join(lines[-3:])}")
+        raise AssertionError(f"{command[0]} ended with {done.returncode}: {' | '.join(lines[-6:])}")
     return done.stdout
 
 
@@ -61,35 +61,19 @@ def tool(name: str) -> Path:
     return Path(found)
 
 
-def built(where: str, commit: str = "HEAD") -> Path:
-    """Build wheel and source distribution of a commit in a folder of its own, with nothing kept."""
+def built(where: str) -> Path:
+    """Build wheel and source distribution of the commit in a folder of its own, from nothing."""
     folder = WORK / where / "piezotrack"
-    if (folder / "dist").exists():
+    if (done := folder / "done").exists():
         return folder / "dist"
     shutil.rmtree(folder.parent, ignore_errors=True)
     run("git", "clone", "--quiet", ROOT, folder)
-    run(
-        "git",
-        "checkout",
-        "--quiet",
-        "--detach",
-        run("git", "rev-parse", commit).strip(),
-        cwd=folder,
-    )
     epoch = run("git", "log", "-1", "--format=%ct", cwd=folder).strip()
     env = {**os.environ, "SOURCE_DATE_EPOCH": epoch, "CARGO_TARGET_DIR": str(folder / "target")}
-    run(
-        BIN / "maturin",
-        "build",
-        "--release",
-        "--locked",
-        "--sdist",
-        "--out",
-        "dist",
-        cwd=folder,
-        env=env,
-    )
+    run(BIN / "maturin", "sdist", "--out", "dist", cwd=folder, env=env)
+    run(BIN / "maturin", "build", "--release", "--locked", "--out", "dist", cwd=folder, env=env)
     shutil.rmtree(folder / "target")
+    done.touch()
     return folder / "dist"
 
 
@@ -275,7 +259,7 @@ def free_threaded() -> str:
 def crate() -> str:
     """Pack the control crate, and build it from what is packed."""
     options = ("--quiet", "--locked", "--allow-dirty", "--target-dir", WORK / "crate")
-    run("cargo", "package", *options, "--package", "piezotrack-control")
+    run("cargo", "publish", "--dry-run", *options, "--package", "piezotrack-control")
     (packed,) = (WORK / "crate" / "package").glob("piezotrack-control-*.crate")
     return f"{packed.name}, {packed.stat().st_size / 1e3:.0f} kB"
 

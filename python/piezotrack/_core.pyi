@@ -73,6 +73,7 @@ __all__ = [
 ]
 
 __version__: str
+INSTRUCTION_SET: str
 INTERVALS: tuple[float, float]
 LARGEST: float
 MOST_SAMPLES: int

@@ -180,15 +180,15 @@ def test_from_a_response_to_a_verified_loop_on_a_gcs_controller(
     monkeypatch.setattr(latency, "MOST", 1e3)
     monkeypatch.setattr("piezotrack.control.verifying.verify.MOST_LATE", 0.1)
     plays = pt.PrandtlIshlinskiiStage(
-        linear=1e-6, thresholds=(0.5, 2.0), weights=(2e-7, 1e-7), time_constant=5e-3
+        linear=1e-6, thresholds=(0.5, 2.0), weights=(2e-7, 1e-7), time_constant=1e-2
     )
     server = pt.hardware.GcsServer(pt.VirtualStage.of(plays, noise=5e-9, limits=LIMITS))
     with server:
         device = pt.hardware.connect(server.address)
         lines = pt.RandomPhaseMultisine(
-            band=(0.5, 22.0), low=28.0, high=32.0, realisations=3, periods=2
+            band=(0.25, 11.0), low=28.0, high=32.0, realisations=3, periods=2
         )
-        response = pt.frequency_response(device, lines, rate=50.0)
+        response = pt.frequency_response(device, lines, rate=25.0)
         tuned = pt.tune(response, limits=LIMITS, parts="pid")
         added = replace(lines, low=-1.0, high=1.0, realisations=4)
         found = pt.verify(device, tuned.controller, added, level=30e-6, model=response)
