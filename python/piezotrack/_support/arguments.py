@@ -240,11 +240,12 @@ def number_pair(name: str, ends: object, unit: str) -> tuple[float, float]:
     # An array is accepted too, and a column of a table.
     several = isinstance(ends, Sequence) or hasattr(type(ends), "tolist")
     pair = list(islice(ends, 3)) if several and has_entries(ends) else []
+    verb = "are" if name.endswith("s") else "is"
     if len(pair) != 2:
-        raise ParameterError(name, quoted(ends), f"(low, high) in {unit}", verb="are")
+        raise ParameterError(name, quoted(ends), f"(low, high) in {unit}", verb=verb)
     low, high = (finite(f"{name}[{i}]", value, unit) for i, value in enumerate(pair))
     if not low < high:
-        raise ParameterError(name, f"({low:g}, {high:g}) {unit}", "the lower one first", verb="are")
+        raise ParameterError(name, f"({low:g}, {high:g}) {unit}", "the lower one first", verb=verb)
     return low, high
 
 

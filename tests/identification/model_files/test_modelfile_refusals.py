@@ -46,9 +46,9 @@ BAD: dict[str, tuple[bytes, str]] = {
     "a number of 5000 digits": ((HEAD + f'"x": {"9" * 5000}}}').encode(), "dahl.json"),
     "a newer version": (
         changed("schema_version", to=3),
-        "dahl.json has schema_version 3: this version of piezotrack reads 1 to 2",
+        "dahl.json: schema_version is 3: expected 1 to 2, which this version",
     ),
-    "no version": (changed("schema_version", drop=True), "dahl.json has schema_version None"),
+    "no version": (changed("schema_version", drop=True), "dahl.json: schema_version is None"),
     "another model": (changed("model", to="maxwell"), "dahl.json holds a model 'maxwell'"),
     "no parameters": (changed("parameters", drop=True), "'parameters' is missing"),
     "no mass": (changed("parameters", "mass", drop=True), "'mass' is missing"),

@@ -81,7 +81,9 @@ def _motion(t: Array) -> tuple[Array, Array, Array]:
 def _triangles(samples: int, height: float) -> Array:
     """Return triangles that fall to a third of their height."""
     k = np.arange(samples)
-    volts: Array = height * (1.0 - 2.0 * k / (3.0 * samples)) * (1.0 - np.abs(k % 500 - 250.0) / 250)
+    volts: Array = (
+        height * (1.0 - 2.0 * k / (3.0 * samples)) * (1.0 - np.abs(k % 500 - 250.0) / 250)
+    )
     return volts
 
 

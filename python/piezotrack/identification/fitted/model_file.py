@@ -94,7 +94,7 @@ def load(path: str | os.PathLike[str]) -> IdentifiedModel:
     >>> pt.load(path).model == model.model
     True
     """
-    name, document = read_document(path)
+    name, document = checked_content(path, "model", FORMAT, SCHEMA_VERSION, first=1)
     try:
         info = model_named(document.get("model"))
     except ParameterError as error:
@@ -225,42 +225,10 @@ def _from_version_1(document: dict[str, Any], *, searched: bool) -> None:
         entry.setdefault("free", not chosen)
 
 
-def read_document(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
-    """Read the JSON of a model file.
-
-    Parameters
-    ----------
-    path : path-like
-        The file.
-
-    Returns
-    -------
-    name : str
-        Of the file, for messages.
-    document : dict
-        Its content.
-
-    Raises
-    ------
-    DataError
-        The file is missing, is not a model file, or was written by a newer version.
-    """
-    name, document = read_content(path)
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{name} is not a piezotrack model: its 'format' is not '{FORMAT}'")
-    version = document.get("schema_version")
-    if version not in (1, SCHEMA_VERSION) or isinstance(version, bool):
-        raise DataError(
-            f"{name} has schema_version {version!r}: this version of piezotrack reads "
-            f"1 to {SCHEMA_VERSION}"
-        )
-    return name, document
-
-
 def checked_content(
-    path: str | os.PathLike[str], kind: str, form: str, version: int
+    path: str | os.PathLike[str], kind: str, form: str, latest: int, first: int | None = None
 ) -> tuple[str, dict[str, Any]]:
-    """Read a file of some `format` and `schema_version`, and return its name and its content.
+    """Read a file of some `format`, of the versions `first` to `latest`; return name and content.
 
     Raises
     ------
@@ -271,10 +239,12 @@ def checked_content(
     if not isinstance(document, dict) or document.get("format") != form:
         raise DataError(f"{name} is not a piezotrack {kind}: its 'format' is not '{form}'")
     found = document.get("schema_version")
-    if found != version or isinstance(found, bool):
+    known = range(latest if first is None else first, latest + 1)
+    if found not in known or isinstance(found, bool):
+        versions = f"{latest}" if len(known) == 1 else f"{known[0]} to {latest}"
         raise DataError(
-            f"{name}: schema_version is {quoted(found)}: expected {version}, which this version of "
-            "piezotrack reads"
+            f"{name}: schema_version is {quoted(found)}: expected {versions}, which this version "
+            "of piezotrack reads"
         )
     return name, document
 
