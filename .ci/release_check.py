@@ -62,19 +62,22 @@ def tool(name: str) -> Path:
 
 
 def built(where: str) -> Path:
-    """Build wheel and source distribution of the commit in a folder of its own, from nothing."""
-    folder = WORK / where / "piezotrack"
-    if (done := folder / "done").exists():
-        return folder / "dist"
-    shutil.rmtree(folder.parent, ignore_errors=True)
+    """Build wheel and source distribution of the commit from nothing; return their folder.
+
+    Always at one place: the list of crates in the wheel has the name of the folder.
+    """
+    if (result := WORK / where).exists():
+        return result
+    folder = WORK / "build" / "piezotrack"
+    shutil.rmtree(folder, ignore_errors=True)
     run("git", "clone", "--quiet", ROOT, folder)
     epoch = run("git", "log", "-1", "--format=%ct", cwd=folder).strip()
     env = {**os.environ, "SOURCE_DATE_EPOCH": epoch, "CARGO_TARGET_DIR": str(folder / "target")}
     run(BIN / "maturin", "sdist", "--out", "dist", cwd=folder, env=env)
     run(BIN / "maturin", "build", "--release", "--locked", "--out", "dist", cwd=folder, env=env)
-    shutil.rmtree(folder / "target")
-    done.touch()
-    return folder / "dist"
+    (folder / "dist").rename(result)
+    shutil.rmtree(folder)
+    return result
 
 
 def wheel(where: str = "first") -> Path:
@@ -161,7 +164,7 @@ def size() -> str:
 
 
 def same_bytes() -> str:
-    """Compare two builds of one commit, in two folders, byte by byte."""
+    """Compare two builds of one commit byte by byte."""
     first, second = built("first"), built("second")
     digests = {}
     for archive in sorted(first.iterdir()):
