@@ -115,7 +115,9 @@ impl<'a> Bytes<'a> {
                 self.numbers(6)
             } else if info.is_optional && self.flag() {
                 vec![]
-            } else if let (Some(usual), false) = (published.first().copied().or(info.default), self.flag()) {
+            } else if let (Some(usual), false) =
+                (published.first().copied().or(info.default), self.flag())
+            {
                 vec![self.near(usual)]
             } else {
                 vec![self.number()]

@@ -43,9 +43,9 @@ fn directly(inverse: &AnyInverse, start: AnyInverseState, mut bytes: Bytes<'_>) 
         assert!(!drive.is_infinite(), "{drive}");
         assert!(!drive.is_nan() || bits(&state) == before, "a state that changed without a drive");
         if bytes.byte() == 1 {
-            let some = bits(&state).into_iter().map(|bits| {
-                if bytes.byte() < 200 { f64::from_bits(bits) } else { bytes.number() }
-            });
+            let some = bits(&state)
+                .into_iter()
+                .map(|bits| if bytes.byte() < 200 { f64::from_bits(bits) } else { bytes.number() });
             let mut numbers = some.collect::<Vec<_>>().into_iter();
             let mut other = state;
             if other.load(&mut || numbers.next()).is_some() {

@@ -4,6 +4,7 @@
 //! functions (`targets/`) as the replay of what it kept (`replay.rs`).
 
 pub mod bytes;
+pub mod checkpoints;
 pub mod controllers;
 pub mod inverses;
 pub mod stages;
@@ -13,7 +14,8 @@ pub mod texts;
 pub type Target = fn(&[u8]) -> bool;
 
 /// All targets by their names, which are those of their folders.
-pub const TARGETS: [(&str, Target); 4] = [
+pub const TARGETS: [(&str, Target); 5] = [
+    ("checkpoints", checkpoints::run),
     ("texts", texts::run),
     ("controllers", controllers::run),
     ("stages", stages::run),

@@ -22,7 +22,7 @@ pub fn run(data: &[u8]) -> bool {
     if let Ok(values) = stage.equilibrium(&voltages) {
         assert!(values.iter().flat_map(|(_, numbers)| numbers).all(|number| number.is_finite()));
     }
-    drop(stage.loop_plants(bytes.near(-10.0), bytes.near(75.0)));
+    let _ = stage.loop_plants(bytes.near(-10.0), bytes.near(75.0));
     let Ok(drive) = Drive::new(&voltages, dt, hold) else { return true };
     let asked = AtomicUsize::new(0);
     let stop = || asked.fetch_add(1, Ordering::Relaxed) > PATIENCE;
@@ -30,7 +30,8 @@ pub fn run(data: &[u8]) -> bool {
     let info = stage.model().info();
     let initial = bytes.flag().then(|| bytes.values(info.state, None));
     let accuracy = bytes.near(1e-7);
-    let experiment = Experiment { initial: initial.as_ref(), method, accuracy, ..Experiment::of(&drive, &stop) };
+    let experiment =
+        Experiment { initial: initial.as_ref(), method, accuracy, ..Experiment::of(&drive, &stop) };
     if let Ok(Some(response)) = stage.simulate(&experiment) {
         assert!([&response.x, &response.v].into_iter().flatten().all(|number| number.is_finite()));
         assert_eq!(response.x.len(), voltages.len());

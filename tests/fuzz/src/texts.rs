@@ -19,7 +19,6 @@ pub fn run(data: &[u8]) -> bool {
     let read = match what {
         0 | 1 => Tie::read(infos, what, &text).map(|tie| {
             let parameters: Vec<f64> = bytes.words().collect();
-            tie.value(&parameters);
             assert!(tie.names().all(|place| place < infos.len()));
             // What is shown of it is itself such a text, with the same meaning.
             let again = Tie::read(infos, what, &tie.text).expect("a tie in one line");
@@ -32,7 +31,9 @@ pub fn run(data: &[u8]) -> bool {
             let again = Constraint::read(infos, &constraint.text).expect("in one line");
             assert_eq!(again, constraint);
         }),
-        _ => Model::named(&text).map(drop).or_else(|_| Law::named(&text, &[1.0; 4], 1e-3).map(drop)),
+        _ => {
+            Model::named(&text).map(drop).or_else(|_| Law::named(&text, &[1.0; 4], 1e-3).map(drop))
+        }
     };
     read.map_err(|error| is_sentence(&error)).is_ok()
 }
