@@ -70,7 +70,7 @@ FUZZ = for one in $(1); do \
 		new=target/fuzz/corpus/$$target; kept=tests/fuzz/corpus/$$target; finds=tests/fuzz/finds/$$target; \
 		mkdir -p $$new $$kept $$finds; \
 		echo "$$target, $$(($(RUNS) * share / 100)) runs"; \
-		$$built/$$target -runs=$$(($(RUNS) * share / 100)) -max_len=800 -timeout=20 -verbosity=0 -print_final_stats=1 \
+		$$built/$$target -runs=$$(($(RUNS) * share / 100)) -max_len=800 -timeout=60 -verbosity=0 -print_final_stats=1 \
 			-artifact_prefix=$$finds/ $$new $$kept 2> target/fuzz/$$target.log \
 			|| { tail -n 40 target/fuzz/$$target.log; exit 1; }; \
 		grep -E '^stat::(number_of_executed|average_exec)' target/fuzz/$$target.log; \

@@ -110,6 +110,10 @@ impl<'a> Bytes<'a> {
     /// Never: each parameter is given once, and a single number where it is one.
     pub fn values(&mut self, infos: &'static [ParameterInfo], usual: Option<&Values>) -> Values {
         let entries = infos.iter().map(|info| {
+            // Any other exponent is integrated, in steps that take milliseconds in the worst case.
+            if info.name == "exponent" && self.byte() < 250 {
+                return vec![1.0];
+            }
             let published = usual.map_or(&[][..], |values| values.list(info.name));
             if info.is_list {
                 self.numbers(6)

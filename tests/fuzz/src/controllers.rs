@@ -63,7 +63,7 @@ fn controller(bytes: &mut Bytes<'_>) -> Option<Controller<Law>> {
 
 fn rest(controller: &Controller<Law>, bytes: &mut Bytes<'_>) -> Option<State> {
     let length = controller.repetitive.map_or(0, |part| part.length());
-    let line = (length <= LONGEST).then(|| vec![0.0; length])?;
+    let line = (length <= LONGEST).then(|| vec![0.0; length + bytes.below(4)])?;
     if bytes.flag() {
         controller.start(bytes.near(1.0), line).ok()
     } else {
