@@ -19,6 +19,9 @@ pub fn run(data: &[u8]) -> bool {
     let Ok(limits) = Limits::new(bytes.near(-10.0), bytes.near(75.0)) else { return false };
     let mut state = online.start(start);
     for k in 0..64 {
+        if bytes.is_empty() && k >= 16 {
+            break;
+        }
         let mut sample = ReferenceSample::new(bytes.near(1e-6 * f64::from(k)));
         let given = bytes.byte();
         sample.preview = (given & 1 == 1).then(|| bytes.near(1e-6 * f64::from(k + 1)));
@@ -56,7 +59,7 @@ fn directly(inverse: &AnyInverse, start: AnyInverseState, mut bytes: Bytes<'_>) 
 }
 
 fn of_stage(bytes: &mut Bytes<'_>, dt: f64) -> Option<(AnyInverse, AnyInverseState)> {
-    let stage = stage(bytes)?;
+    let (stage, _) = stage(bytes)?;
     let initial = bytes.flag().then(|| bytes.values(stage.model().info().state, None));
     let (inverse, state) = stage.inverse(dt, initial.as_ref()).ok()?;
     Some((AnyInverse::Stage(Box::new(inverse)), AnyInverseState::Stage(state)))
