@@ -1,6 +1,8 @@
 //! Content of a checkpoint: its first line and the answers after it. Nothing of Python is here, so
 //! that the fuzzers read it too.
 
+use piezotrack_core::error::shown_text;
+
 /// First words of the file, with the version of its format.
 const FORMAT: &str = "piezotrack-checkpoint 1";
 
@@ -37,7 +39,7 @@ pub fn payload(content: &[u8], identity: &str) -> Result<Vec<u8>, String> {
         return Err("is not as it was written: expected it unchanged, or none".into());
     };
     if Some(version) != FORMAT.split(' ').next_back() {
-        return Err(format!("is of version {}: expected 1", version.escape_debug()));
+        return Err(format!("is of version {}: expected 1", shown_text(version)));
     }
     if known != identity {
         return Err("is that of another search: expected the same records, model, arguments and \
