@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak studies fuzz lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs links crate-docs architecture pictures notices c-library c-package c-header c-header-test sentences public-names release-check clean
+.PHONY: help demo reproduce benchmark test soak studies fuzz fuzz-guided fuzz-rust fuzz-c fuzz-built fuzz-replay fuzz-corpus lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs links crate-docs architecture pictures notices c-library c-package c-header c-header-test sentences public-names release-check clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -13,6 +13,14 @@ FILES ?= 4000
 CASES ?= 2048
 TABLE ?= target/tries.md
 LOOP ?= 10
+# Of the guided fuzzers: executions of all targets together, of which each has so many hundredths.
+RUNS ?= 500000
+CLANG ?= clang
+FUZZED := checkpoints=10 texts=30 controllers=30 stages=5 inverses=15
+FUZZED_C := library=10
+# What `cargo fuzz` gives rustc, without a sanitizer: counters of edges, and comparisons, which a
+# fuzzer solves. With a target named, build scripts have none of it.
+COVERAGE := -Cpasses=sancov-module $(addprefix -Cllvm-args=-sanitizer-coverage-,level=4 inline-8bit-counters pc-table trace-compares) --cfg fuzzing
 # A Cortex-M4F.
 EMBEDDED := thumbv7em-none-eabihf
 SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.html' -o -name '*.js' -o -name '*.svg' -o -name '*.gz' -o -name Cargo.toml | grep -v rust/capi) benches/Cargo.toml Cargo.toml Cargo.lock pyproject.toml
@@ -44,7 +52,7 @@ test: $(VENV)/pip ## Everything that must hold before a change lands
 
 rust-checks: lint-rust rust-test c-library
 
-soak: fuzz ## The tests that take long: fuzzers, properties, examples, searches with full budgets
+soak: fuzz fuzz-replay ## The tests that take long: fuzzers, properties, examples, searches with full budgets
 	PROPTEST_CASES=$(CASES) PROPTEST_RNG_SEED=$(SEED) cargo test --locked --release -p piezotrack-core --test properties
 	$(BIN)/pytest -n auto --dist worksteal -m "slow and not study" --ignore=tests/soak
 
@@ -53,6 +61,50 @@ studies: $(VENV)/installed $(VENV)/tools ## Rates over many records: coverage of
 
 fuzz: $(VENV)/installed $(VENV)/tools ## The fuzzers, with their table of tries and failures: SEED=7 CALLS=1000000 FILES=100000
 	$(BIN)/pytest -n auto --dist worksteal -m slow tests/soak --soak-seed=$(SEED) --soak-calls=$(CALLS) --soak-files=$(FILES) --soak-table=$(TABLE) --soak-loop=$(LOOP)
+
+fuzz-guided: fuzz-rust fuzz-c ## Fuzzers that coverage guides, of the crates and of the C library: RUNS=10000000
+
+# New inputs are kept in target/fuzz/corpus, finds in tests/fuzz/finds.
+FUZZ = for one in $(1); do \
+		target=$${one%=*}; share=$${one\#*=}; \
+		new=target/fuzz/corpus/$$target; kept=tests/fuzz/corpus/$$target; finds=tests/fuzz/finds/$$target; \
+		mkdir -p $$new $$kept $$finds; \
+		echo "$$target, $$(($(RUNS) * share / 100)) runs"; \
+		$$built/$$target -runs=$$(($(RUNS) * share / 100)) -max_len=800 -timeout=60 -verbosity=0 -print_final_stats=1 \
+			-artifact_prefix=$$finds/ $$new $$kept 2> target/fuzz/$$target.log \
+			|| { tail -n 40 target/fuzz/$$target.log; exit 1; }; \
+		grep -E '^stat::(number_of_executed|average_exec)' target/fuzz/$$target.log; \
+	done
+FUZZ_BUILT = target/fuzz/$$(rustc -vV | sed -n 's/^host: //p')/release
+
+fuzz-built:
+	RUSTFLAGS="$(COVERAGE)" cargo build --locked --release --workspace --manifest-path tests/fuzz/Cargo.toml \
+		--target-dir target/fuzz --target "$$(rustc -vV | sed -n 's/^host: //p')" --features libfuzzer
+
+fuzz-rust: fuzz-built ## The guided fuzzers of the crates
+	@built=$(FUZZ_BUILT); $(call FUZZ,$(FUZZED))
+
+# The library is compiled from its sources with counters of edges, the harness with the sanitizers
+# too: they watch all memory that the library takes and frees, and what crosses the border.
+fuzz-c: fuzz-built ## The guided fuzzer of the C library, under AddressSanitizer and UndefinedBehaviorSanitizer
+	@command -v $(CLANG) >/dev/null || { echo "clang with libFuzzer is needed; on Debian install it by: apt install clang libclang-rt-14-dev" >&2; exit 1; }
+	@mkdir -p target/fuzz/c
+	$(CLANG) -g -O1 -std=c11 -Wall -Wextra -Werror -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=undefined \
+		-Irust/capi/include tests/fuzz/c/library.c $(FUZZ_BUILT)/libpiezotrack.a -lm -lpthread -ldl -lgcc_s -o target/fuzz/c/library
+	@built=target/fuzz/c; $(call FUZZ,$(FUZZED_C))
+
+fuzz-replay: ## Replay what the guided fuzzers kept, without libFuzzer
+	cargo test --quiet --locked --release --manifest-path tests/fuzz/Cargo.toml --target-dir target/fuzz --test replay
+
+fuzz-corpus: ## Keep of all inputs the fewest that reach the same code: tests/fuzz/corpus
+	@for one in $(FUZZED) $(FUZZED_C); do \
+		target=$${one%=*}; built=$(FUZZ_BUILT); kept=tests/fuzz/corpus/$$target; all=target/fuzz/merged/$$target; \
+		[ -x $$built/$$target ] || built=target/fuzz/c; \
+		rm -rf $$all; mkdir -p $$all; \
+		$$built/$$target -merge=1 -set_cover_merge=1 $$all $$kept target/fuzz/corpus/$$target 2> target/fuzz/$$target.merge.log || exit 1; \
+		rm -rf $$kept; cp -r $$all $$kept; \
+		echo "$$target: $$(ls $$kept | wc -l) files, $$(du -bs $$kept | cut -f1) bytes"; \
+	done
 
 lint: lint-rust lint-python ## Formatting, clippy, ruff, types, layers, stubs
 

@@ -24,9 +24,10 @@ def test_the_package_has_the_version_of_the_workspace() -> None:
 
 def test_the_locks_have_the_version_of_the_workspace() -> None:
     # With another one, --locked refuses to build.
-    for lock in ("Cargo.lock", "tests/no_std/Cargo.lock"):
+    tests = {"piezotrack-no-std", "piezotrack-fuzz", "piezotrack-fuzz-c"}
+    for lock in ("Cargo.lock", "tests/no_std/Cargo.lock", "tests/fuzz/Cargo.lock"):
         own = [package for package in toml(lock)["package"] if "source" not in package]
-        versions = {p["name"]: p["version"] for p in own if p["name"] != "piezotrack-no-std"}
+        versions = {p["name"]: p["version"] for p in own if p["name"] not in tests}
         assert versions
         assert set(versions.values()) == {VERSION}, lock
 

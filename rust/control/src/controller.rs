@@ -367,16 +367,24 @@ impl<F: Feedback> Controller<F> {
     /// whose inverse otherwise remembers what the stage never got.
     ///
     /// It is within the limits and, where the command was clipped or [`Self::applied`] reported a
-    /// saturated amplifier, not beyond the voltage that was applied. `None` where that is all of it.
+    /// saturated amplifier, not beyond the voltage that was applied, which may have been outside of
+    /// the limits. `None` where that is all of it.
     #[must_use]
     pub fn reached<L>(&self, state: &ControllerState<F::State, L>) -> Option<f64> {
         let (asked, excess) = (state.last.feedforward, state.excess);
         let mut reached = self.limits.clip(asked);
         if excess.abs() > READING * (self.limits.high() - self.limits.low()) {
-            let volts = state.voltage();
+            // Not from the excess, which of a huge command has lost the voltage to rounding.
+            let volts = if state.reported { self.near(state.voltage()) } else { state.last.volts };
             reached = if excess < 0.0 { reached.min(volts) } else { reached.max(volts) };
         }
         ((reached - asked).abs() > 0.0).then_some(reached)
+    }
+
+    /// A voltage, outside the limits by the range between them at most.
+    fn near(&self, volts: f64) -> f64 {
+        let (low, high) = (self.limits.low(), self.limits.high());
+        volts.max(low - (high - low)).min(high + (high - low))
     }
 
     #[inline]

@@ -133,6 +133,17 @@ pub fn shown(value: f64) -> String {
     }
 }
 
+/// Most characters of a text that an error repeats.
+const SHOWN: usize = 60;
+
+/// A text of the caller's in quotes and in one line, and not all of a long one.
+#[must_use]
+pub fn shown_text(text: &str) -> String {
+    let short: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
+    let more = if text.chars().count() > SHOWN { "..." } else { "" };
+    format!("'{short}{more}'")
+}
+
 fn check(name: &str, value: f64, unit: &str, holds: bool, expected: &str) -> Result<f64> {
     if value.is_finite() && holds {
         return Ok(value);

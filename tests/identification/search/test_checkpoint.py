@@ -205,7 +205,7 @@ def test_a_damaged_checkpoint_is_refused_and_kept(damage: str, tmp_path: Path) -
     elif damage == "changed":
         content = content[:-5] + b"x" + content[-4:]
     elif damage == "newer":
-        content, expected = content.replace(b"checkpoint 1 ", b"checkpoint 2 "), "is of version 2"
+        content, expected = content.replace(b"checkpoint 1 ", b"checkpoint 2 "), "is of version '2'"
     else:
         content = b"time,voltage\n0,1\n" if damage == "other" else b""
         expected = "is no checkpoint"

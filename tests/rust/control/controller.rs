@@ -275,3 +275,21 @@ fn delay_line_may_be_lent() {
     assert!(controller.step(&mut state, 1e-6, 0.0, 20.0).volts > 19.9);
     assert_eq!(controller.rest([0.0; 3]).unwrap_err().name, "line");
 }
+
+/// A fuzzer found it: of a command of 1e24 V the voltage was lost in the difference between them.
+#[test]
+fn what_reached_the_stage_is_within_the_limits_whatever_was_commanded() {
+    let law = Pid::new(1e30, f64::INFINITY, 0.0, None).unwrap().at(DT).unwrap();
+    let controller = Controller::new(Limits::new(4.0, 20.0).unwrap(), law);
+    for (reference, feedforward) in [(1e-6, 10.0), (-1e-6, 10.0), (1e-6, 30.0), (-1e-6, -3.0)] {
+        let mut state = controller.rest([]).unwrap();
+        let command = controller.step(&mut state, reference, 0.0, feedforward);
+        assert!(command.unclipped.abs() > 1e20);
+        let reached = controller.reached(&state).unwrap_or(feedforward);
+        assert!((4.0..=20.0).contains(&reached), "{reached}");
+        // A report from outside of the limits is believed, as far as it can be.
+        controller.applied(&mut state, 30.0).unwrap();
+        let reached = controller.reached(&state).unwrap_or(feedforward);
+        assert!((-12.0..=36.0).contains(&reached), "{reached}");
+    }
+}

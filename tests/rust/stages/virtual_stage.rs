@@ -410,3 +410,21 @@ fn a_run_goes_on_at_another_interval_and_is_unchanged_by_what_it_refuses() {
     assert_eq!(slow.displacement[49], other.displacement[49]);
     assert!((fast.displacement[399] - other.displacement[99]).abs() < 1e-3 * UM);
 }
+
+/// A fuzzer found it: the creep took a finite equilibrium beyond all numbers.
+#[test]
+fn an_equilibrium_that_overflows_with_its_creep_is_none() {
+    let model = Model::named("dahl").unwrap();
+    let (_, published) = model.info().published[0];
+    let of = |creep: f64| {
+        let mut given = vec![("creep_weights".to_owned(), vec![creep])];
+        given.push(("creep_times".to_owned(), vec![1.0]));
+        given.extend(published().iter().map(|(name, numbers)| (name.to_owned(), numbers.to_vec())));
+        let values = Values::named(model.info().parameters, given).unwrap();
+        model.build(&values).unwrap().equilibrium(&[1e8])
+    };
+    let settled = of(1.0).unwrap().number("x");
+    assert!(settled.is_finite() && settled > 10.0, "{settled}");
+    let refused = of(1e308).unwrap_err().to_string();
+    assert!(refused.contains("no equilibrium"), "{refused}");
+}

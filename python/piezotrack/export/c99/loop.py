@@ -278,8 +278,14 @@ REMEMBER_REACHED = """\
 static void remember_reached(NAME_state *s)
 {
     const real asked = s->last.feedforward;
-    const real there = voltage(s);
+    real there = s->last.volts;
     real reached = clip(asked);
+    if (s->reported) {
+        /* of a huge command the excess has lost the voltage to rounding */
+        there = voltage(s);
+        there = there < FAR_LOW ? FAR_LOW : there;
+        there = there > FAR_HIGH ? FAR_HIGH : there;
+    }
     if (s->excess < -APPLIED_NEAR) {
         reached = reached < there ? reached : there;
     } else if (s->excess > APPLIED_NEAR) {

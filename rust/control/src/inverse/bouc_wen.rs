@@ -136,8 +136,8 @@ impl<O: Operator<f64, State = BoucWenState<f64>>> BoucWenInverse<O> {
     /// The voltage for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of
     /// the reference.
     ///
-    /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100) or the
-    /// iteration did not converge; a controller holds its feedforward then.
+    /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100), the
+    /// iteration did not converge or the voltage is not finite; a controller holds its feedforward then.
     #[inline]
     pub fn step(&self, state: &mut BoucWenInverseState, x: f64, v: f64, a: f64) -> f64 {
         if !(usable(x) && usable(v) && usable(a)) {
@@ -168,8 +168,12 @@ impl<O: Operator<f64, State = BoucWenState<f64>>> BoucWenInverse<O> {
             let inside = newton > low && newton < high;
             let next = if inside { newton } else { 0.5 * (low + high.min(2.0 * way + 1.0)) };
             if done || (next - way).abs() <= 1e-15 * (way + state.u.abs()) {
-                *state = BoucWenInverseState { u: state.u + direction * way, memory: there };
-                return state.u;
+                let u = state.u + direction * way;
+                if !u.is_finite() {
+                    return f64::NAN;
+                }
+                *state = BoucWenInverseState { u, memory: there };
+                return u;
             }
             way = next;
         }

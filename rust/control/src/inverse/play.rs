@@ -54,7 +54,7 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
     /// Transforms the thresholds, weights and dead zones.
     ///
     /// # Errors
-    /// Where the operator has no inverse of this form: `linear` is 0, a weight has another sign,
+    /// Where the operator has no inverse of this form: `linear` is 0 or within 1e-100 of it, a weight has another sign,
     /// thresholds or dead-zone thresholds do not ascend, or a slope of the dead zones is
     /// not above 0.
     pub fn new(play: &Play<f64, PLAYS, ZONES>) -> Result<Self> {
@@ -91,13 +91,15 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
     /// Moves the output of the operator to `output` and returns its input (V).
     ///
     /// Exact for a step of any length, provided that the output is monotone within it. NaN, with
-    /// the state unchanged, where `output` is not finite (or beyond 1e100).
+    /// the state unchanged, where `output` is not finite (or beyond 1e100), or what goes into the
+    /// dead zones is not.
     #[inline]
     pub fn follow(&self, state: &mut PlayState<f64, PLAYS>, output: f64) -> f64 {
-        if !usable(output) {
+        let before = self.before_dead_zones(output);
+        if !(usable(output) && usable(before)) {
             return f64::NAN;
         }
-        self.plays.follow(state, self.before_dead_zones(output))
+        self.plays.follow(state, before)
     }
 
     /// Input of the dead zones where `output` comes out of them: the weighted sum of the
@@ -168,8 +170,9 @@ fn zones<const PLAYS: usize, const ZONES: usize>(
 fn plays<const PLAYS: usize, const ZONES: usize>(
     play: &Play<f64, PLAYS, ZONES>,
 ) -> Result<Play<f64, PLAYS, 0>> {
-    let right = play.linear.is_finite() && play.linear != 0.0;
-    let expected = "a finite number other than 0";
+    // So that no input overflows: the slopes of the inverse are not above 1/linear.
+    let right = play.linear.is_finite() && play.linear.abs() >= 1e-100;
+    let expected = "a finite number, 1e-100 or more from 0";
     let mut sum = check("linear", play.linear, "", right, expected)?;
     let sign = sum.signum();
     let mut inverse = Play {

@@ -18,6 +18,7 @@ use super::parameters::values::{Held, ParameterInfo, ROOM, Values, extended};
 use super::plant::{Plant, Settling};
 use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
+    finite_state,
 };
 use crate::design::LoopPlant;
 use crate::error::{Error, Result};
@@ -169,7 +170,8 @@ impl<M: StageModel> StageModel for Creeping<M> {
         let state = self.stage.equilibrium(voltages)?;
         let x = state.number("x");
         let reached = vec![x; self.creep().len()];
-        Ok(state.with("x", self.settled_gain() * x).followed(Self::INFO.state, vec![reached]))
+        let state = state.with("x", self.settled_gain() * x);
+        finite_state(state.followed(Self::INFO.state, vec![reached]), voltages)
     }
 
     fn simulate(&self, experiment: &Experiment<'_>) -> Result<Option<Response>> {

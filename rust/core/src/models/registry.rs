@@ -14,7 +14,7 @@ use super::traits::{
     Experiment, Invertible, KernelVisitor, ModelInfo, Response, Searchable, StageModel,
 };
 use crate::design::LoopPlant;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown_text};
 use crate::integrator::{Order, Parameters};
 
 /// How the parameters of a model are found from a record.
@@ -339,7 +339,7 @@ impl Model {
         Self::ALL.iter().copied().find(|model| model.info().name == name).ok_or_else(|| {
             let names: Vec<String> =
                 Self::ALL.iter().map(|model| format!("'{}'", model.info().name)).collect();
-            Error::parameter("model", format!("'{name}'"), names.join(" or "))
+            Error::parameter("model", shown_text(name), names.join(" or "))
         })
     }
 

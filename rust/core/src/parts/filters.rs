@@ -3,7 +3,7 @@
 use piezotrack_control::Filter;
 
 use super::info::{NumberInfo, PartInfo, Role};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown_text};
 
 pub(super) const LOW_PASS: PartInfo =
     PartInfo::new(Role::Filter, "low-pass", "low-pass", &[NumberInfo::new("cutoff", "", "Hz")]);
@@ -27,7 +27,7 @@ pub(super) fn filter(name: &str, numbers: &[f64], dt: f64) -> Result<Filter> {
         ("notch", _) => return Err(NOTCH.refused(numbers)),
         ("low-pass", _) => return Err(LOW_PASS.refused(numbers)),
         (other, _) => {
-            return Err(Error::parameter("filter", format!("'{other}'"), "'low-pass' or 'notch'"));
+            return Err(Error::parameter("filter", shown_text(other), "'low-pass' or 'notch'"));
         }
     })
 }

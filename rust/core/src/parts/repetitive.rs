@@ -3,7 +3,7 @@
 use piezotrack_control::{Repetitive, Smoothing};
 
 use super::info::{Form, NumberInfo, PartInfo, Role, truth, whole};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown_text};
 
 pub(super) const LAG: PartInfo = PartInfo::new(
     Role::Smoothing,
@@ -38,7 +38,7 @@ pub(super) const REPETITIVE: PartInfo = PartInfo::new(
 /// saturation.
 pub(super) fn repetitive(smoothing: &str, numbers: &[f64]) -> Result<Repetitive> {
     let &[period, kq, number, forgetting_factor, lead, pause] = numbers else {
-        let value = format!("'{smoothing}' with {} numbers", numbers.len());
+        let value = format!("{} with {} numbers", shown_text(smoothing), numbers.len());
         return Err(Error::parameter("repetitive", value, "six numbers"));
     };
     let smoothing = match smoothing {
@@ -48,7 +48,7 @@ pub(super) fn repetitive(smoothing: &str, numbers: &[f64]) -> Result<Repetitive>
         "none" => Smoothing::None,
         other => {
             let expected = "'lag', 'compensated-lag', 'zero-phase' or 'none'";
-            return Err(Error::parameter("smoothing", format!("'{other}'"), expected));
+            return Err(Error::parameter("smoothing", shown_text(other), expected));
         }
     };
     let (lead, pause) = (count("lead", lead)?, truth("pause", pause)?);

@@ -7,7 +7,7 @@ use piezotrack_control::{
     PositivePositionFeedback, PositiveVelocityPositionFeedback, Repetitive, SlidingMode, Smoothing,
 };
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown_text};
 use crate::parts::Law;
 
 /// Highest cutoff of a low-pass, in sampling rates; above it the filter is left out.
@@ -124,7 +124,7 @@ impl Setting {
         NAMES.iter().find(|(known, _)| *known == name).map(|(_, setting)| *setting).ok_or_else(
             || {
                 let names: Vec<&str> = NAMES.iter().map(|(known, _)| *known).collect();
-                Error::parameter("setting", format!("'{name}'"), names.join(", "))
+                Error::parameter("setting", shown_text(name), names.join(", "))
             },
         )
     }

@@ -14,10 +14,8 @@ use std::time::{Duration, Instant};
 use piezotrack_core::identify::Journal;
 use pyo3::prelude::*;
 
+use super::checkpoint_content::{answer, head, keep, payload};
 use crate::errors::data;
-
-/// First words of the file, with the version of its format.
-const FORMAT: &str = "piezotrack-checkpoint 1";
 
 /// Time between two writings.
 const INTERVAL: Duration = Duration::from_millis(500);
@@ -109,24 +107,13 @@ impl Journal for Answers {
 
     fn keep(&self, numbers: &[f64]) {
         self.with(|state| {
-            state.bytes.extend((numbers.len() as u64).to_le_bytes());
-            state.bytes.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+            keep(numbers, &mut state.bytes);
             state.read = state.bytes.len();
             if state.failure.is_none() && state.last.elapsed() >= INTERVAL {
                 self.save(state);
             }
         });
     }
-}
-
-/// The first answer of some bytes, if it has so many numbers, and its length in bytes.
-fn answer(bytes: &[u8], count: usize) -> Option<(Vec<f64>, usize)> {
-    let (head, rest) = bytes.split_first_chunk()?;
-    let written = usize::try_from(u64::from_le_bytes(*head)).ok()?;
-    let numbers = rest.get(..count.checked_mul(size_of::<f64>())?)?;
-    let (numbers, _) = numbers.as_chunks();
-    let found = numbers.iter().map(|number| f64::from_le_bytes(*number)).collect();
-    (written == count).then_some((found, size_of::<u64>() + size_of::<f64>() * count))
 }
 
 impl Answers {
@@ -138,12 +125,7 @@ impl Answers {
     /// Writes the file; a failure is kept for the end, as the search itself can go on.
     fn save(&self, state: &mut State) {
         state.last = Instant::now();
-        let head = format!(
-            "{FORMAT} {} {} {:016x}\n",
-            self.identity,
-            state.bytes.len(),
-            sum(&state.bytes)
-        );
+        let head = head(&self.identity, &state.bytes);
         if let Err(error) = replace(&self.path, &[head.as_bytes(), &state.bytes]) {
             state.failure = Some(reason(&error));
         }
@@ -186,39 +168,4 @@ fn replace(path: &Path, parts: &[&[u8]]) -> io::Result<()> {
         // The reason for the failure matters more than what is left of the attempt.
         let _ = fs::remove_file(&beside);
     })
-}
-
-/// The answers in the content of a file, or what is wrong with it.
-fn payload(content: &[u8], identity: &str) -> Result<Vec<u8>, String> {
-    let end = content.iter().take(200).position(|&byte| byte == b'\n');
-    let head = end.and_then(|end| std::str::from_utf8(&content[..end]).ok()).unwrap_or("");
-    let Some(words) = head.strip_prefix("piezotrack-checkpoint ") else {
-        return Err("is no checkpoint: expected a file that a search has written, or none".into());
-    };
-    let words: Vec<&str> = words.split(' ').collect();
-    let [version, known, length, total] = words[..] else {
-        return Err("is not as it was written: expected it unchanged, or none".into());
-    };
-    if Some(version) != FORMAT.split(' ').next_back() {
-        return Err(format!("is of version {version}: expected 1"));
-    }
-    if known != identity {
-        return Err("is that of another search: expected the same records, model, arguments and \
-                    version, or another file"
-            .into());
-    }
-    let bytes = &content[head.len() + 1..];
-    if length != bytes.len().to_string() || total != format!("{:016x}", sum(bytes)) {
-        return Err("is not as it was written: expected it unchanged, or none".into());
-    }
-    Ok(bytes.to_vec())
-}
-
-/// FNV-1a of 64 bits, by words of eight bytes and the rest.
-fn sum(bytes: &[u8]) -> u64 {
-    const PRIME: u64 = 0x0000_0100_0000_01b3;
-    let (words, rest) = bytes.as_chunks::<8>();
-    let words = words.iter().map(|word| u64::from_le_bytes(*word));
-    let all = words.chain(rest.iter().map(|&byte| u64::from(byte)));
-    all.fold(0xcbf2_9ce4_8422_2325, |sum, word| (sum ^ word).wrapping_mul(PRIME))
 }

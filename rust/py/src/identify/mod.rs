@@ -1,6 +1,7 @@
 //! Identification of models, and the experiments and searches beside it.
 
 pub mod checkpoint;
+mod checkpoint_content;
 pub mod covariance;
 pub mod descents;
 pub mod identification;

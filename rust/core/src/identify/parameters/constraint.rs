@@ -7,8 +7,8 @@
 
 use super::candidate::PLACES;
 use super::coordinate::Coordinate;
-use super::tie::{in_one_line, shown_text};
-use crate::error::{Error, Result, shown};
+use super::tie::in_one_line;
+use crate::error::{Error, Result, shown, shown_text};
 use crate::models::{ParameterInfo, position};
 
 /// Least coordinate of the unit box at which a parameter counts as on its limit.

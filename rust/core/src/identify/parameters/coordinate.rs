@@ -1,6 +1,6 @@
 //! One coordinate of a search: a parameter that is held, or free between two bounds.
 
-use crate::error::{Error, Result, shown};
+use crate::error::{Error, Result, shown, shown_text};
 
 /// How a coordinate of the unit box maps to a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,8 +21,8 @@ impl Scale {
             "linear" => Ok(Self::Linear),
             "log" => Ok(Self::Log),
             other => {
-                let (argument, found) = (format!("scale of {parameter}"), other.escape_debug());
-                Err(Error::parameter(argument, format!("'{found}'"), "'linear' or 'log'"))
+                let argument = format!("scale of {parameter}");
+                Err(Error::parameter(argument, shown_text(other), "'linear' or 'log'"))
             }
         }
     }

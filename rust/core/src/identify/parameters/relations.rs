@@ -4,8 +4,8 @@ use super::candidate::{DELAY, PLACES, Theta};
 use super::constraint::{self, Constraint};
 use super::coordinate::Coordinate;
 use super::prior::{Prior, factor};
-use super::tie::{self, Tie, shown_text};
-use crate::error::{Error, Result, shown};
+use super::tie::{self, Tie};
+use crate::error::{Error, Result, shown, shown_text};
 use crate::integrator::MOST_PARAMETERS;
 use crate::models::{Model, ParameterInfo, position};
 

@@ -4,7 +4,7 @@
 //! done with it: numbers, names of parameters, `+ - * / **`, brackets, `sqrt`, `exp` and `log`, with
 //! the precedence that they have in Python. Length and depth are limited.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown_text};
 use crate::models::ParameterInfo;
 
 /// Most characters of an expression.
@@ -12,9 +12,6 @@ const MOST_CHARACTERS: usize = 500;
 
 /// Most levels of brackets, signs and powers within each other.
 const MOST_LEVELS: usize = 40;
-
-/// Most characters of a text that an error repeats.
-const SHOWN: usize = 60;
 
 /// One step of an evaluation on a stack.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -148,13 +145,6 @@ fn circle(infos: &[ParameterInfo], ties: &[Tie]) -> Error {
 /// A text that was understood, with single blanks.
 pub(in crate::identify) fn in_one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-/// A text of the caller's in one line, and not all of a long one.
-pub(in crate::identify) fn shown_text(text: &str) -> String {
-    let short: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
-    let more = if text.chars().count() > SHOWN { "..." } else { "" };
-    format!("'{short}{more}'")
 }
 
 /// A text on its way to steps.

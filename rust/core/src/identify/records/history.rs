@@ -4,7 +4,7 @@
 //! there decides the memory of its hysteresis. A record does not show the drive before it, so the
 //! history is assumed, or found with the parameters.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown_text};
 use crate::signal::{Drive, Hold, range, turns};
 
 /// Assumption about the drive before a record.
@@ -26,7 +26,7 @@ impl History {
     pub fn named(name: &str) -> Result<Self> {
         let all = [Self::Virgin, Self::Settled, Self::Fitted];
         all.into_iter().find(|history| history.name() == name).ok_or_else(|| {
-            Error::parameter("history", format!("'{name}'"), "'virgin', 'settled' or 'fit'")
+            Error::parameter("history", shown_text(name), "'virgin', 'settled' or 'fit'")
         })
     }
 

@@ -1,6 +1,6 @@
 //! Names and values of a model's parameters and states.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown_text};
 use crate::integrator::{MOST_PARAMETERS, Parameters};
 
 /// Name, symbol and unit of one parameter, and whether it is searched.
@@ -205,7 +205,7 @@ impl Values {
 pub fn position(infos: &[ParameterInfo], argument: &str, name: &str) -> Result<usize> {
     infos.iter().position(|info| info.name == name).ok_or_else(|| {
         let names: Vec<&str> = infos.iter().map(|info| info.name).collect();
-        Error::parameter(argument, format!("'{name}'"), format!("one of {}", names.join(", ")))
+        Error::parameter(argument, shown_text(name), format!("one of {}", names.join(", ")))
     })
 }
 

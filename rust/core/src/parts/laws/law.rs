@@ -14,7 +14,7 @@ use super::{
     pid, positive_position, positive_velocity_position, scheduled_pid, sliding_mode, state_space,
 };
 use crate::design::LinearFeedback;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown_text};
 use crate::parts::info::PartInfo;
 
 /// Makes the types that hold any law from one list: name of the variant, type of the sampled law,
@@ -64,7 +64,7 @@ macro_rules! laws {
                     other => {
                         let names: Vec<String> =
                             Self::INFOS.iter().map(|info| format!("'{}'", info.name)).collect();
-                        Err(Error::parameter("law", format!("'{other}'"), names.join(", ")))
+                        Err(Error::parameter("law", shown_text(other), names.join(", ")))
                     }
                 }
             }
