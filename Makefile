@@ -14,10 +14,10 @@ CASES ?= 2048
 TABLE ?= target/tries.md
 LOOP ?= 10
 # Of the guided fuzzers: executions of all targets together, of which each has so many hundredths.
-RUNS ?= 500000
+RUNS ?= 300000
 CLANG ?= clang
-FUZZED := checkpoints=10 texts=30 controllers=30 stages=5 inverses=15
-FUZZED_C := library=10
+FUZZED := checkpoints=30 texts=45 controllers=10 stages=4 inverses=6
+FUZZED_C := library=5
 # What `cargo fuzz` gives rustc, without a sanitizer: counters of edges, and comparisons, which a
 # fuzzer solves. With a target named, build scripts have none of it.
 COVERAGE := -Cpasses=sancov-module $(addprefix -Cllvm-args=-sanitizer-coverage-,level=4 inline-8bit-counters pc-table trace-compares) --cfg fuzzing
@@ -70,7 +70,7 @@ FUZZ = for one in $(1); do \
 		new=target/fuzz/corpus/$$target; kept=tests/fuzz/corpus/$$target; finds=tests/fuzz/finds/$$target; \
 		mkdir -p $$new $$kept $$finds; \
 		echo "$$target, $$(($(RUNS) * share / 100)) runs"; \
-		$$built/$$target -runs=$$(($(RUNS) * share / 100)) -max_len=800 -timeout=60 -verbosity=0 -print_final_stats=1 \
+		$$built/$$target -runs=$$(($(RUNS) * share / 100)) -max_len=400 -len_control=20 -timeout=60 -verbosity=0 -print_final_stats=1 \
 			-artifact_prefix=$$finds/ $$new $$kept 2> target/fuzz/$$target.log \
 			|| { tail -n 40 target/fuzz/$$target.log; exit 1; }; \
 		grep -E '^stat::(number_of_executed|average_exec)' target/fuzz/$$target.log; \
@@ -101,7 +101,7 @@ fuzz-corpus: ## Keep of all inputs the fewest that reach the same code: tests/fu
 		target=$${one%=*}; built=$(FUZZ_BUILT); kept=tests/fuzz/corpus/$$target; all=target/fuzz/merged/$$target; \
 		[ -x $$built/$$target ] || built=target/fuzz/c; \
 		rm -rf $$all; mkdir -p $$all; \
-		$$built/$$target -merge=1 -set_cover_merge=1 $$all $$kept target/fuzz/corpus/$$target 2> target/fuzz/$$target.merge.log || exit 1; \
+		$$built/$$target -set_cover_merge=1 -use_counters=0 $$all $$kept target/fuzz/corpus/$$target 2> target/fuzz/$$target.merge.log || exit 1; \
 		rm -rf $$kept; cp -r $$all $$kept; \
 		echo "$$target: $$(ls $$kept | wc -l) files, $$(du -bs $$kept | cut -f1) bytes"; \
 	done

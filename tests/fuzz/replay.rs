@@ -1,6 +1,5 @@
 //! Replays what the fuzzers kept: inputs that together reach all code that any input reached, and
 //! those that found a fault.
-#![expect(clippy::unwrap_used, reason = "a test")]
 
 use std::fs;
 use std::path::Path;

@@ -105,9 +105,6 @@ impl<'a> Bytes<'a> {
     }
 
     /// Values of the parameters of a model, around published ones where there are any.
-    ///
-    /// # Panics
-    /// Never: each parameter is given once, and a single number where it is one.
     pub fn values(&mut self, infos: &'static [ParameterInfo], usual: Option<&Values>) -> Values {
         let entries = infos.iter().map(|info| {
             // Any other exponent is integrated, in steps that take milliseconds in the worst case.

@@ -13,7 +13,7 @@ pub fn run(data: &[u8]) -> bool {
     let dt = bytes.near(1e-3);
     let made = if bytes.below(8) == 7 { network(&mut bytes) } else { of_stage(&mut bytes, dt) };
     let Some((inverse, start)) = made else { return false };
-    directly(&inverse, start, bytes);
+    directly(&inverse, &start, bytes);
     let (offset, delay) = (bytes.near(0.0), bytes.near(0.0));
     let Ok(online) = OnlineFeedforward::new(inverse, dt, offset, delay) else { return false };
     let Ok(limits) = Limits::new(bytes.near(-10.0), bytes.near(75.0)) else { return false };
@@ -24,12 +24,12 @@ pub fn run(data: &[u8]) -> bool {
         }
         let mut sample = ReferenceSample::new(bytes.near(1e-6 * f64::from(k)));
         let given = bytes.byte();
-        sample.preview = (given & 1 == 1).then(|| bytes.near(1e-6 * f64::from(k + 1)));
-        sample.velocity = (given & 6 == 6).then(|| bytes.near(1e-3));
-        sample.acceleration = (given & 24 == 24).then(|| bytes.near(1.0));
+        sample.preview = (given & 0x01 == 0x01).then(|| bytes.near(1e-6 * f64::from(k + 1)));
+        sample.velocity = (given & 0x06 == 0x06).then(|| bytes.near(1e-3));
+        sample.acceleration = (given & 0x18 == 0x18).then(|| bytes.near(1.0));
         let drive = online.step_within(&mut state, &sample, &limits);
         assert!(!drive.is_infinite(), "{drive}");
-        if given & 224 == 224 {
+        if given & 0xe0 == 0xe0 {
             online.applied(&mut state, bytes.near(10.0));
         }
     }
@@ -37,8 +37,8 @@ pub fn run(data: &[u8]) -> bool {
 }
 
 /// The inverse alone: NaN leaves the state as it was, and numbers from elsewhere do no harm.
-fn directly(inverse: &AnyInverse, start: AnyInverseState, mut bytes: Bytes<'_>) {
-    let mut state = start;
+fn directly(inverse: &AnyInverse, start: &AnyInverseState, mut bytes: Bytes<'_>) {
+    let mut state = *start;
     for k in 0..16 {
         let before = bits(&state);
         let x = bytes.near(1e-6 * f64::from(k));
