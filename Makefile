@@ -20,7 +20,7 @@ FUZZED := checkpoints=30 texts=45 controllers=10 stages=4 inverses=6
 FUZZED_C := library=5
 # What `cargo fuzz` gives rustc, without a sanitizer: counters of edges, and comparisons, which a
 # fuzzer solves. With a target named, build scripts have none of it.
-COVERAGE := -Cpasses=sancov-module $(addprefix -Cllvm-args=-sanitizer-coverage-,level=4 inline-8bit-counters pc-table trace-compares) --cfg fuzzing
+COUNTERS := -Cpasses=sancov-module $(addprefix -Cllvm-args=-sanitizer-coverage-,level=4 inline-8bit-counters pc-table trace-compares) --cfg fuzzing
 # A Cortex-M4F.
 EMBEDDED := thumbv7em-none-eabihf
 SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.html' -o -name '*.js' -o -name '*.svg' -o -name '*.gz' -o -name Cargo.toml | grep -v rust/capi) benches/Cargo.toml Cargo.toml Cargo.lock pyproject.toml
@@ -78,7 +78,7 @@ FUZZ = for one in $(1); do \
 FUZZ_BUILT = target/fuzz/$$(rustc -vV | sed -n 's/^host: //p')/release
 
 fuzz-built:
-	RUSTFLAGS="$(COVERAGE)" cargo build --locked --release --workspace --manifest-path tests/fuzz/Cargo.toml \
+	RUSTFLAGS="$(COUNTERS)" cargo build --locked --release --workspace --manifest-path tests/fuzz/Cargo.toml \
 		--target-dir target/fuzz --target "$$(rustc -vV | sed -n 's/^host: //p')" --features libfuzzer
 
 fuzz-rust: fuzz-built ## The guided fuzzers of the crates
