@@ -2,8 +2,8 @@
 
     python .ci/profiles.py target/coverage > target/coverage/rust.lcov
 
-The folder has ``profiles/``, ``built.json`` (what cargo says of the tests it built) and ``venv/``, where
-the instrumented module is installed.
+The folder has ``profiles/``, ``built.json`` (what cargo says of the tests it built) and ``venv/``,
+where the instrumented module is installed.
 """
 
 from __future__ import annotations

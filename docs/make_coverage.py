@@ -1,9 +1,9 @@
 """Put into docs/coverage.md how much of the code the tests reach, as ``make coverage`` counted it.
 
-Run as ``python docs/make_coverage.py FOLDER`` with the folder of ``python.json`` of coverage.py and of
-``rust.lcov``. It writes there, into ``missed.txt``, the lines of each file that nothing reaches. The
-reasons on the page are written by hand: where three statements of Python in a row are not reached,
-and the page does not name the file, the run ends with an error.
+Run as ``python docs/make_coverage.py FOLDER``, where ``python.json`` of coverage.py and
+``rust.lcov`` are. It writes there, into ``missed.txt``, the lines of each file that none reaches.
+The reasons on the page are written by hand: where three statements of Python in a row are not
+reached, and the page does not name the file, the run ends with an error.
 """
 
 from __future__ import annotations
