@@ -100,7 +100,8 @@ c-header-test:
 # All that is reached by the crates' tests and by those of the package, which run once: in an
 # environment whose wheel counts, with coverage.py counting on the Python side. That a test fails,
 # which can be as all of it is slower, is for `make test` to judge.
-INSTRUMENTED = RUSTC_WORKSPACE_WRAPPER="$(CURDIR)/.ci/instrumented" CARGO_TARGET_DIR="$(CURDIR)/$(COVERAGE)/cargo"
+INSTRUMENTED = PYO3_PYTHON="$(CURDIR)/$(COVERAGE)/venv/bin/python" CARGO_TARGET_DIR="$(CURDIR)/$(COVERAGE)/cargo" \
+	RUSTC_WORKSPACE_WRAPPER="$(CURDIR)/.ci/instrumented"
 PROFILES = LLVM_PROFILE_FILE="$(CURDIR)/$(COVERAGE)/profiles/%4m.profraw"
 CRATE_TESTS = cargo test --locked --release -p piezotrack-control -p piezotrack-core -p piezotrack-py --lib --bins --tests
 
@@ -110,9 +111,10 @@ coverage: ## What the tests reach of Python and Rust, lines and branches: docs/c
 	$(COVERAGE)/venv/bin/python -m pip install --quiet --group coverage
 	rm -rf $(COVERAGE)/profiles $(COVERAGE)/python $(COVERAGE)/html
 	mkdir -p $(COVERAGE)/python
-	PYO3_PYTHON="$(CURDIR)/$(COVERAGE)/venv/bin/python" $(INSTRUMENTED) $(PROFILES) $(CRATE_TESTS)
-	PYO3_PYTHON="$(CURDIR)/$(COVERAGE)/venv/bin/python" $(INSTRUMENTED) $(CRATE_TESTS) --no-run --quiet --message-format=json > $(COVERAGE)/built.json
-	-$(PROFILES) $(COVERAGE)/venv/bin/coverage run -m pytest -n auto --dist worksteal -m "not slow and not study"
+	$(INSTRUMENTED) $(PROFILES) $(CRATE_TESTS)
+	$(INSTRUMENTED) $(CRATE_TESTS) --no-run --quiet --message-format=json > $(COVERAGE)/built.json
+	$(INSTRUMENTED) cargo build --locked --release -p piezotrack-capi -p piezotrack-py
+	-$(PROFILES) CARGO_TARGET_DIR="$(CURDIR)/$(COVERAGE)/cargo" $(COVERAGE)/venv/bin/coverage run -m pytest -n auto --dist worksteal -m "not slow and not study"
 	$(COVERAGE)/venv/bin/coverage combine --quiet
 	$(COVERAGE)/venv/bin/coverage html --quiet
 	$(COVERAGE)/venv/bin/coverage json --quiet -o $(COVERAGE)/python.json
