@@ -2,8 +2,9 @@
 
 Run as ``python docs/make_coverage.py FOLDER``, where ``python.json`` of coverage.py and
 ``rust.lcov`` are. It writes there, into ``missed.txt``, the lines of each file that none reaches.
-The reasons on the page are written by hand: where three statements of Python in a row are not
-reached, and the page does not name the file, the run ends with an error.
+The reasons on the page are written by hand. Where three statements of Python in a row are not
+reached and the page does not name the file, they are printed; the run ends with an error if that
+is so where hardware or files are handled.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "coverage.md"
 BEGIN, END = "<!-- Table of make coverage. -->", "<!-- End of the table. -->"
 PACKAGE = "python/piezotrack/"
-# Statements in a row that need a test or a reason.
+# Statements in a row that need a test or a reason, and where the run ends without.
 BLOCK = 3
+STRICT = ("_support/files/", "adapters/", "control/on_device/", "data/formats/", "hardware/")
 
 
 @dataclass
@@ -129,13 +131,14 @@ def main() -> None:
     PAGE.write_text(f"{before}{BEGIN}\n\n{text}\n\n{END}{after}", "utf-8")
     print(text)
     unnamed = [
-        f"{name}:{block[0]}-{block[-1]}"
+        f"{name.removeprefix(PACKAGE)}:{block[0]}-{block[-1]}"
         for name, counts in sorted(python.items())
         for block in counts.blocks()
         if len(block) >= BLOCK and f"`{name.removeprefix(PACKAGE)}`" not in page
     ]
-    if unnamed:
-        sys.exit("\n".join(["reached by no test, and no reason in docs/coverage.md:", *unnamed]))
+    print("\n".join(["", f"Without a test or a reason: {len(unnamed)}", *unnamed]))
+    if strict := [one for one in unnamed if one.startswith(STRICT)]:
+        sys.exit("\n".join(["", "Where hardware or files are handled:", *strict]))
 
 
 if __name__ == "__main__":
