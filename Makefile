@@ -1,6 +1,6 @@
 # What a person types. Needs a Rust toolchain and Python 3.11 or newer; all else is put in .venv.
 .DEFAULT_GOAL := help
-.PHONY: help demo reproduce benchmark test soak studies fuzz fuzz-guided fuzz-rust fuzz-c fuzz-built fuzz-replay fuzz-corpus lint lint-rust lint-python rust-test no-std python-test rust-checks bench docs links crate-docs architecture pictures notices c-library c-package c-header c-header-test sentences public-names release-check clean
+.PHONY: help demo reproduce benchmark test soak studies fuzz fuzz-guided fuzz-rust fuzz-c fuzz-built fuzz-replay fuzz-corpus lint lint-rust lint-python rust-test no-std python-test rust-checks coverage bench docs links crate-docs architecture pictures notices c-library c-package c-header c-header-test sentences public-names release-check clean
 
 PYTHON ?= python3
 VENV := .venv
@@ -21,6 +21,8 @@ FUZZED_C := library=5
 # What `cargo fuzz` gives rustc, without a sanitizer: counters of edges, and comparisons, which a
 # fuzzer solves. With a target named, build scripts have none of it.
 COUNTERS := -Cpasses=sancov-module $(addprefix -Cllvm-args=-sanitizer-coverage-,level=4 inline-8bit-counters pc-table trace-compares) --cfg fuzzing
+# Of `make coverage`: an environment, wheel and crates of its own.
+COVERAGE := target/coverage
 # A Cortex-M4F.
 EMBEDDED := thumbv7em-none-eabihf
 SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.html' -o -name '*.js' -o -name '*.svg' -o -name '*.gz' -o -name Cargo.toml | grep -v rust/capi) benches/Cargo.toml Cargo.toml Cargo.lock pyproject.toml
@@ -153,6 +155,30 @@ c-header: ## Write rust/capi/include/piezotrack.h from the functions of the C li
 
 c-header-test:
 	cargo test --quiet --locked --manifest-path tests/c_header/Cargo.toml --target-dir target/c-header
+
+# All that is reached by the crates' tests and by those of the package, which run once: in an
+# environment whose wheel counts, with coverage.py counting on the Python side. That a test fails,
+# which can be as all of it is slower, is for `make test` to judge.
+INSTRUMENTED = PYO3_PYTHON="$(CURDIR)/$(COVERAGE)/venv/bin/python" CARGO_TARGET_DIR="$(CURDIR)/$(COVERAGE)/cargo" \
+	RUSTC_WORKSPACE_WRAPPER="$(CURDIR)/.ci/instrumented"
+PROFILES = LLVM_PROFILE_FILE="$(CURDIR)/$(COVERAGE)/profiles/%4m.profraw"
+CRATE_TESTS = cargo test --locked --release -p piezotrack-control -p piezotrack-core -p piezotrack-py --lib --bins --tests
+
+coverage: ## What the tests reach of Python and Rust, lines and branches: docs/coverage.md, target/coverage
+	@mkdir -p $(COVERAGE)
+	@$(INSTRUMENTED) $(SUB) VENV=$(COVERAGE)/venv WHEELS=$(COVERAGE)/wheels $(COVERAGE)/venv/installed $(COVERAGE)/venv/tools
+	$(COVERAGE)/venv/bin/python -m pip install --quiet --group coverage
+	rm -rf $(COVERAGE)/profiles $(COVERAGE)/python $(COVERAGE)/html
+	mkdir -p $(COVERAGE)/python
+	$(INSTRUMENTED) $(PROFILES) $(CRATE_TESTS)
+	$(INSTRUMENTED) $(CRATE_TESTS) --no-run --quiet --message-format=json > $(COVERAGE)/built.json
+	$(INSTRUMENTED) cargo build --locked --release -p piezotrack-capi -p piezotrack-py
+	-$(PROFILES) CARGO_TARGET_DIR="$(CURDIR)/$(COVERAGE)/cargo" $(COVERAGE)/venv/bin/coverage run -m pytest -n auto --dist worksteal -m "not slow and not study"
+	$(COVERAGE)/venv/bin/coverage combine --quiet
+	$(COVERAGE)/venv/bin/coverage html --quiet
+	$(COVERAGE)/venv/bin/coverage json --quiet -o $(COVERAGE)/python.json
+	$(COVERAGE)/venv/bin/python .ci/profiles.py $(COVERAGE) > $(COVERAGE)/rust.lcov
+	$(COVERAGE)/venv/bin/python docs/make_coverage.py $(COVERAGE)
 
 bench: ## Criterion benches: throughput of the swarm, latency of a step
 	cargo bench --locked

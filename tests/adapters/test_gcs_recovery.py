@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import signal
+import socket
 import threading
 import time
 from contextlib import closing, contextmanager
@@ -123,6 +124,67 @@ def test_a_connection_that_ends_in_an_upload_is_not_made_anew_in_it() -> None:
         device.play(np.full(100, 5.0), 100.0)
     assert any(line.startswith("WAV") for line in there.lines)
     assert "WGO 1 1" not in there.lines
+
+
+def test_a_query_that_is_refused_beside_a_voltage_shifts_no_answer() -> None:
+    """The reading and the voltage go out in one message, whose error is that of the query."""
+
+    def refuse(_: str) -> Said:
+        there.error = 5
+        return ""
+
+    there = Spoilt(once(2, "POS? 1", refuse), speed=1.0)
+    with connected(there, WAIT) as device:
+        before = device.exchange(20.0)
+        with pytest.raises(pt.DeviceError, match=r"POS\? 1.*5"):
+            device.exchange(20.0)
+        assert device.exchange(20.0) == pytest.approx(before, abs=30e-6)
+        assert device.voltage == 20.0
+
+
+@pytest.mark.parametrize("failure", [BrokenPipeError, KeyboardInterrupt])
+def test_a_command_that_goes_out_by_half_is_not_completed_by_the_next(
+    failure: type[BaseException], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there = Spoilt(lambda _, answer: answer, speed=1.0)
+    whole = socket.socket.sendall
+
+    def half(link: socket.socket, data: bytes) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            return whole(link, data)
+        whole(link, data[: len(data) // 2])
+        raise failure
+
+    with connected(there, 30.0) as device:
+        device.hold(5.0)
+        with monkeypatch.context() as patched:
+            patched.setattr(socket.socket, "sendall", half)
+            with pytest.raises(
+                KeyboardInterrupt if failure is KeyboardInterrupt else pt.DeviceError
+            ):
+                device.hold(66.0)
+        device.hold(7.0)
+        assert there.voltage == 7.0
+    sent = [line for line in there.lines if line.startswith("SVA")]
+    assert sent == ["SVA 1 5", "SVA 1 7"]
+
+
+def test_a_connection_that_is_reset_while_idle_is_a_sentence_and_then_made_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    there = Spoilt(lambda _, answer: answer, speed=1.0)
+
+    def reset(*_: object) -> bytes:
+        raise ConnectionResetError
+
+    with connected(there, 30.0) as device:
+        device.hold(5.0)
+        with monkeypatch.context() as patched:
+            patched.setattr(socket.socket, "recv", reset)
+            with pytest.raises(pt.DeviceError):
+                device.exchange(6.0)
+        device.hold(7.0)
+        assert there.voltage == 7.0
 
 
 # A line that never ends.

@@ -149,6 +149,31 @@ def test_errors_of_the_driver_are_sentences_and_leave_no_task(
     assert not below.tasks
 
 
+def test_readings_that_the_driver_leaves_out_are_no_record(
+    driver: Callable[..., NiStandIn], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from nidaqmx.stream_readers import AnalogSingleChannelReader
+
+    below = driver()
+    device = pt.hardware.connect(ADDRESS)
+    monkeypatch.setattr(AnalogSingleChannelReader, "read_many_sample", lambda *_: 7)
+    with pytest.raises(pt.DeviceError, match=r"Dev1/ai0 read 7 samples: expected 50"):
+        device.play(np.linspace(0.0, 5.0, 50), 500.0)
+    # No task is left, which would keep the channels from the next.
+    assert not below.tasks
+
+
+def test_a_table_that_the_memory_does_not_hold_is_not_played(
+    driver: Callable[..., NiStandIn],
+) -> None:
+    below = driver()
+    device = pt.hardware.connect(ADDRESS)
+    below.calls.clear()
+    with pytest.raises(pt.DeviceError, match=f"expected {device.memory} at most"):
+        device.play(np.broadcast_to(1.0, (device.memory,)), 1000.0, lead_in=0.001)
+    assert below.calls == []
+
+
 def test_nothing_beyond_the_limits_reaches_the_driver(driver: Callable[..., NiStandIn]) -> None:
     below = driver()
     device = pt.hardware.connect(ADDRESS)
@@ -187,6 +212,7 @@ def test_without_nidaqmx_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> 
         (f"{CHANNELS}?scale=10&limits=0..7V", "scale='10' .*no unit per volt.*10um/V"),
         (f"{CHANNELS}?scale=10V/V&limits=0..7V", "no displacement"),
         (f"{CHANNELS}?scale=10um/um&limits=0..7V", "voltage"),
+        (f"{CHANNELS}?scale=0um/V&limits=0..7V", "the scale of the sensor"),
         (f"{CHANNELS}?scale=10um/V&limits=0..7", "limits='0..7'.*expected voltage"),
         (f"{CHANNELS}?scale=10um/V&limits=7V", "LOW..HIGH"),
         (f"{CHANNELS}?scale=10um/V&limits=7..0V", "lower one first"),

@@ -159,6 +159,20 @@ def test_a_list_of_the_wrong_length_is_no_record() -> None:
         device.play(np.zeros(3), 100.0)
 
 
+def test_a_list_that_the_memory_does_not_hold_is_not_sent() -> None:
+    with instrument(buffer=pt.hardware.ScpiBuffer(**LIST)) as (device, there):
+        with pytest.raises(pt.DeviceError, match=r"5001 samples with its lead-in.*5000"):
+            device.play(np.full(5000, 5.0), 1000.0, lead_in=0.001)
+        assert there.device.held == 0.0
+
+
+def test_a_list_is_divided_only_where_its_parts_can_be_joined() -> None:
+    with pytest.raises(
+        pt.ParameterError, match=r"chunk is 100 and append is None: .*both, or none"
+    ):
+        pt.hardware.ScpiBuffer(**LIST, chunk=100)
+
+
 def test_measured_round_trips() -> None:
     with instrument() as (device, _):
         trip = pt.hardware.round_trip(device, 0.0, count=50)

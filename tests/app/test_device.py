@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +22,7 @@ from page.server import Served
 from page.window import Window
 from piezotrack.app.device import DeviceProcess
 from piezotrack.app.steps import model
+from piezotrack.app.steps.device import _measured
 from piezotrack.stages.registry import MODELS
 
 if TYPE_CHECKING:
@@ -137,6 +141,30 @@ def test_an_address_without_a_device_is_refused() -> None:
         DeviceProcess("nothing:")
     with pytest.raises(pt.DeviceError, match=r"127\.0\.0\.1"):
         DeviceProcess("gcs://127.0.0.1:1")
+
+
+def test_after_work_that_fails_the_device_is_there_for_the_next(device: DeviceProcess) -> None:
+    # Each gets the device and a function; the first takes one thing only.
+    with pytest.raises(pt.DeviceError, match="TypeError"):
+        device.run(operator.not_)  # type: ignore[arg-type]
+    assert not device.busy
+    assert device.run(operator.is_not)
+
+
+def test_the_end_of_the_process_of_a_device_is_said_each_time(
+    slow: pt.hardware.GcsServer,
+) -> None:
+    device = DeviceProcess(slow.address)
+    killed = threading.Timer(0.5, device._process.kill)
+    work = partial(_measured, drive="triangle:0.1Hz,5..65V,10s", rate=100.0, ramp=0.1)
+    killed.start()
+    for _ in range(2):
+        with pytest.raises(pt.DeviceError, match="has ended"):
+            device.run(work)
+        assert not device.busy
+    # Nothing is left to be told or ended.
+    device.stop()
+    device.close()
 
 
 def reached(other: Any, there: Callable[[float], bool], within: float) -> None:

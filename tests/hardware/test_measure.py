@@ -14,6 +14,8 @@ import piezotrack as pt
 from piezotrack.hardware import Rates, Record, VirtualDevice
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -108,6 +110,40 @@ def test_what_is_asked_wrongly_is_refused_before_it_goes_out(
 def test_a_way_from_rest_that_the_memory_does_not_hold_is_refused_at_once(ramp: float) -> None:
     with pytest.raises(pt.ParameterError, match=r"ramp is 1\S+ s: expected at most 10000 s"):
         pt.measure(device(), "sine:1Hz,0..75V", rate=1000.0, ramp=ramp)
+
+
+def test_a_virtual_stage_refuses_what_a_device_cannot_do() -> None:
+    stage = pt.VirtualStage.xu_li_2010(seed=1)
+    device = pt.hardware.VirtualDevice(stage, memory=100)
+    with pytest.raises(pt.DeviceError, match="101 samples: the memory holds 100"):
+        device.play(np.full(101, 5.0), 1000.0)
+    assert device.held == 0.0
+    device.close()
+    with pytest.raises(pt.DeviceError, match="is closed"):
+        device.hold(5.0)
+    assert device.held == 0.0
+
+
+def test_a_virtual_stage_of_a_model_file_moves_as_the_model(tmp_path: Path) -> None:
+    plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(1e-7,))
+    bare = pt.identification.IdentifiedModel(
+        model=plays, offset=3e-6, offset_fitted=True, stroke=40e-6
+    )
+    whole = replace(bare, details={"provenance": {"data": {"drive_range": [0.0, 40.0]}}})
+    whole.save(tmp_path / "model.json")
+    device = pt.hardware.connect(f"virtual:{tmp_path / 'model.json'}")
+    with pytest.raises(pt.DeviceError, match="50 V"):
+        device.hold(50.0)
+    u = 20.0 - 20.0 * np.cos(2.0 * np.pi * np.arange(3000) / 1000.0)
+    moved = device.play(u, 1000.0).displacement
+    # A sample is read when its voltage goes out, before the stage follows.
+    np.testing.assert_allclose(moved[1:], plays.simulate(u, 1e-3).x[:-1] + 3e-6, atol=1e-9)
+    with pytest.raises(pt.ParameterError, match="expected virtual:, virtual:MODEL"):
+        pt.hardware.connect(f"virtual:{tmp_path / 'model.json'}?one")
+    # Nobody knows which voltages the stage bears.
+    bare.save(tmp_path / "bare.json")
+    with pytest.raises(pt.ParameterError, match=r"bare.json is without the range of its drive"):
+        pt.hardware.connect(f"virtual:{tmp_path / 'bare.json'}")
 
 
 def test_a_virtual_stage_that_was_left_alone_for_a_day_answers() -> None:

@@ -180,6 +180,10 @@ def from_address(
             "device", "a virtual stage", "virtual:, virtual:MODEL.json or virtual:MODEL.json?zero"
         )
     stage, limits = virtual_stage(path or None, zeroed=bool(options))
+    if path and limits is None:
+        raise ParameterError(
+            f"device {path}", "without the range of its drive", "a model identified from a record"
+        )
     return VirtualDevice(stage, limits=limits)
 
 

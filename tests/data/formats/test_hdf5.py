@@ -138,6 +138,9 @@ def test_a_heap_of_texts_that_is_no_chain_is_refused(tmp_path: Path) -> None:
         changed[heap + place : heap + place + 8] = value.to_bytes(8, "little")
         path.write_bytes(changed)
         assert "heap" in refusal(path)
+    # One that begins at the end of the file.
+    path.write_bytes(content + b"GCOL\x01")
+    assert "heap" in refusal(path)
     path.write_bytes(content)
     assert is_the_log(pt.read(path))
 

@@ -129,6 +129,43 @@ def test_a_file_that_lies_about_its_sizes_is_refused(tmp_path: Path, lie: str) -
     assert "expected" in found
 
 
+FLAGS, SHAPE, NAME = (
+    mat_element(6, struct.pack("<II", 6, 0)),
+    mat_element(5, struct.pack("<2i", 1, 3)),
+    mat_element(1, b"voltage_V"),
+)
+STRUCTURED = mat_element(6, struct.pack("<II", 2, 0)) + mat_element(5, struct.pack("<2i", 1, 1))
+UNSOUND = {
+    "half a tag": bytes(4),
+    "an element that is no variable": mat_element(9, bytes(24)),
+    "compressed: no tag": mat_element(15, zlib.compress(b"abc")),
+    "compressed: no variable": mat_element(15, zlib.compress(mat_element(9, bytes(24)))),
+    "compressed: none of it": mat_element(15, b"not compressed at all"),
+    "no flags": mat_element(14, mat_element(6, b"") + SHAPE + NAME),
+    "nothing but flags": mat_element(14, FLAGS),
+    "a shape below nothing": mat_element(14, mat_array((-1, 3), bytes(24))),
+    "values of no type": mat_element(14, FLAGS + SHAPE + NAME + mat_element(99, bytes(24))),
+    "more values than places": mat_element(14, mat_array((1, 3), bytes(32))),
+    "five bytes in a tag for four": mat_element(14, FLAGS + struct.pack("<HHI", 5, 5, 0)),
+    "fields without a length": mat_element(
+        14, STRUCTURED + NAME + mat_element(5, b"") + mat_element(1, b"time")
+    ),
+    "fields of no letters": mat_element(
+        14, STRUCTURED + NAME + mat_element(5, struct.pack("<i", 0)) + mat_element(1, b"time")
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", UNSOUND)
+def test_a_file_that_is_not_sound_is_refused(tmp_path: Path, fault: str) -> None:
+    """Behind a variable that is: nothing of a damaged file is taken for a log."""
+    path = tmp_path / "log.mat"
+    path.write_bytes(
+        MAT_HEADER + mat_element(14, mat_array((1, 400), U.tobytes())) + UNSOUND[fault]
+    )
+    assert "is not a sound MAT file" in refusal(path, dt=DT)
+
+
 @pytest.mark.parametrize("kind", [1, 2, 3, 4, 5])
 def test_cells_and_structures_take_no_memory_however_many(tmp_path: Path, kind: int) -> None:
     path = tmp_path / "log.mat"
