@@ -275,7 +275,7 @@ def semver() -> str:
         raise Impossible("cargo install --locked cargo-semver-checks")
     baseline = before[0] if before else "HEAD"
     run("cargo", "semver-checks", "--package", "piezotrack-control", "--baseline-rev", baseline)
-    return f"compared with {baseline}"
+    return f"compared with {before[0]}" if before else "no earlier release: compared with itself"
 
 
 def crates() -> str:
