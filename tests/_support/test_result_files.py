@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import subprocess
@@ -50,6 +51,31 @@ def test_nothing_is_replaced_before_all_are_complete(tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
+    assert content(tmp_path) == dict.fromkeys(NAMES, "old")
+    save(tmp_path, "new")
+    assert content(tmp_path) == dict.fromkeys(NAMES, "new")
+
+
+def test_a_marker_that_has_no_room_leaves_what_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save(tmp_path, "old")
+    opened = Path.open
+
+    def full(path: Path, *mode: Any, **named: Any) -> Any:
+        file = opened(path, *mode, **named)
+        if path.name == MARKER and mode == ("x",):
+
+            def write(text: str) -> int:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), text[:0])
+
+            file.write = write  # type: ignore[method-assign]
+        return file
+
+    monkeypatch.setattr(Path, "open", full)
+    with pytest.raises((OSError, pt.DataError), match="[Nn]o space left"):
+        save(tmp_path, "new")
+    monkeypatch.undo()
     assert content(tmp_path) == dict.fromkeys(NAMES, "old")
     save(tmp_path, "new")
     assert content(tmp_path) == dict.fromkeys(NAMES, "new")

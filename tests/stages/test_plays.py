@@ -283,7 +283,7 @@ BROKEN: dict[str, tuple[Any, str]] = {
         lambda d: d.update(model="plays"),
         "holds a model 'plays': expected one of 'dahl'",
     ),
-    "version": (lambda d: d.update(schema_version=3), "has schema_version 3"),
+    "version": (lambda d: d.update(schema_version=3), "schema_version is 3: expected 1 to 2"),
 }
 
 

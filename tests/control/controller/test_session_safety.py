@@ -210,9 +210,9 @@ def test_a_glitch_that_is_no_unit_never_raises() -> None:
     ("changes", "message"),
     [
         ({"span": (0.0, 1.5)}, "span is 1.5 m: expected a displacement in m, at most a metre"),
-        ({"span": (1e-4, 0.0)}, r"span are \(0.0001, 0\) m: expected the lower one first"),
+        ({"span": (1e-4, 0.0)}, r"span is \(0.0001, 0\) m: expected the lower one first"),
         ({"span": (0.0, math.nan)}, r"span\[1\] is nan"),
-        ({"span": 1e-4}, r"span are 0.0001: expected \(low, high\) in m"),
+        ({"span": 1e-4}, r"span is 0.0001: expected \(low, high\) in m"),
         ({"max_jump": 0.0}, "max_jump is 0 m: expected a displacement above 0"),
         ({"max_jump": math.nan}, "max_jump is NaN m"),
         ({"max_jump": "1"}, "max_jump is '1'"),
