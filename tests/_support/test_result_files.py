@@ -73,7 +73,7 @@ def test_a_marker_that_has_no_room_leaves_what_was(
         return file
 
     monkeypatch.setattr(Path, "open", full)
-    with pytest.raises((OSError, pt.DataError), match="[Nn]o space left"):
+    with pytest.raises((OSError, pt.DataError), match=r"[Nn]o space left"):
         save(tmp_path, "new")
     monkeypatch.undo()
     assert content(tmp_path) == dict.fromkeys(NAMES, "old")
