@@ -69,7 +69,7 @@ def test_a_marker_that_has_no_room_leaves_what_was(
             def write(text: str) -> int:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), text[:0])
 
-            file.write = write  # type: ignore[method-assign]
+            file.write = write
         return file
 
     monkeypatch.setattr(Path, "open", full)
