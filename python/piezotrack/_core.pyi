@@ -8,6 +8,7 @@ from .identification.problem.problem import Problem
 from .identification.solve.weights import Structure
 
 __all__ = [
+    "INSTRUCTION_SET",
     "INTERVALS",
     "LARGEST",
     "MOST_SAMPLES",
