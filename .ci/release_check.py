@@ -228,17 +228,9 @@ def oldest() -> str:
     python = WORK / "oldest" / "bin" / "python"
     shutil.rmtree(WORK / "oldest", ignore_errors=True)
     run(sys.executable, "-m", "venv", WORK / "oldest")
-    run(
-        uv,
-        "pip",
-        "install",
-        "--quiet",
-        "--python",
-        python,
-        "--resolution",
-        "lowest-direct",
-        wheel(),
-    )
+    # Dependencies of a wheel are direct ones where pyproject.toml is given too.
+    options = ("--resolution", "lowest-direct", "--requirements", ROOT / "pyproject.toml")
+    run(uv, "pip", "install", "--quiet", "--python", python, *options, wheel())
     document = json.loads(run(python, "-m", "piezotrack", "doctor", "--json", cwd=WORK))
     with tempfile.TemporaryDirectory() as folder:
         run(python, "-m", "piezotrack", "demo", "--out", "demo", cwd=Path(folder))
