@@ -1,4 +1,4 @@
-"""What is public changes only with a line in the changelog."""
+"""Public names change only with a line in the changelog."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ends a loop on a device: a sensor that stands still, readings that are none, late ticks."""
+"""Ends of a loop on a device: a sensor that stands still, readings that are none, late ticks."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ fn rest(controller: &Controller<Law>, bytes: &mut Bytes<'_>) -> Option<State> {
     }
 }
 
-/// What else can happen between two samples.
+/// Events between two samples.
 fn meanwhile(now: &mut Controller<Law>, state: &mut State, bytes: &mut Bytes<'_>) {
     match bytes.below(32) {
         1 => now.reset(state),
