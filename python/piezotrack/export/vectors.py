@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..control.controller.controller import Controller
     from ..references.reference import Reference
 
-__all__ = ["HEADER", "STEPS", "Row", "rows_of", "vectors_text"]
+__all__ = ["HEADER", "STEPS", "Row", "reach_of", "rows_of", "vectors_text"]
 
 STEPS = 2000
 # A longer period is gone through twice, up to this many steps.
@@ -87,7 +87,7 @@ def rows_of(
         2000, or more where two periods are longer.
     """
     steps = _steps(controller, table)
-    bottom, top = _reach(controller)
+    bottom, top = reach_of(controller)
     low, high = controller.limits
     gain = (top - bottom) / (high - low)
     motion = _motion(controller, steps, bottom, top, reference)
@@ -131,8 +131,8 @@ def _steps(controller: Controller, table: Sequence[float] | None) -> int:
     return min(max(STEPS, math.ceil(2.5 * longest)), MOST_STEPS)
 
 
-def _reach(controller: Controller) -> tuple[float, float]:
-    """Displacements between which the test moves [m]."""
+def reach_of(controller: Controller) -> tuple[float, float]:
+    """Return the displacements between which the test moves [m]."""
     low, high = controller._valid
     if controller.feedforward is None:
         if controller.span is None:

@@ -1,4 +1,4 @@
-"""Export of a controller: C99, calls of the C library, coefficients in JSON, FMI 2.0."""
+"""Export of a controller: C99, firmware, calls of the C library, coefficients in JSON, FMI 2.0."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from .. import _core
-from .._support.arguments import expect, one_of
+from .._support.arguments import expect, one_of, positive
 from .._support.files.writing import make_folder, replacing, result_set, write_document
 from .._support.units import shown_unit
 from ..control.controller.controller import Controller
 from ..errors import ParameterError
 from ..references.reference import Reference
+from .c99.instructions import check_clock, instructions_of
 from .c99.parts import feedforward_table
 from .c99.sources import c_sources, checked_name
+from .firmware.project import firmware_project, project_files
 from .fmu.unit import compiler, fmu_bytes
 from .json_form import coefficients_document
 from .library import library_sources
@@ -26,8 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Exported", "export_controller", "export_files"]
 
-To = Literal["c99", "library", "json", "fmu"]
-FORMS = ("c99", "library", "json", "fmu")
+To = Literal["c99", "firmware", "library", "json", "fmu"]
+FORMS = ("c99", "firmware", "library", "json", "fmu")
 LEFT_OUT = (
     "without the feedforward, whose inverse is no filter: reference= or table= writes it as a table"
 )
@@ -41,12 +43,15 @@ class Exported:
     ----------
     files : tuple of pathlib.Path
         The files.
-    to : {"c99", "library", "json", "fmu"}
+    to : {"c99", "firmware", "library", "json", "fmu"}
         The form.
     state_bytes : int or None
         Bytes of the state in C; None for coefficients and for calls of the library.
     additions, multiplications, divisions : int or None
         Floating-point operations of a step that does not saturate; None as above.
+    instructions, most_instructions : int or None
+        Bounds of the instructions of a step within the limits and of any step, on a Cortex-M with a
+        floating-point unit for its numbers; None as above.
     bound : float or None
         Largest difference to the Rust controller that ``check.c`` accepts, in the unit of the
         drive: 0 for doubles. None for coefficients.
@@ -60,6 +65,8 @@ class Exported:
     additions: int | None = None
     multiplications: int | None = None
     divisions: int | None = None
+    instructions: int | None = None
+    most_instructions: int | None = None
     bound: float | None = None
     note: str = ""
 
@@ -69,6 +76,9 @@ class Exported:
             return f"{text}; {self.note}" if self.note else text
         text = f"state {self.state_bytes} bytes; a step has {self.additions} additions, "
         text += f"{self.multiplications} multiplications, {self.divisions} divisions"
+        text += f"; at most {self.instructions} instructions on a Cortex-M"
+        if self.most_instructions != self.instructions:
+            text += f", {self.most_instructions} beyond the limits"
         text += "" if self.bound == 0.0 else f"; within {self.bound:.3g} of the doubles"
         return f"{text}; {self.note}" if self.note else text
 
@@ -83,7 +93,7 @@ def export_files(to: To, name: str) -> list[str]:
         "fmu": [f"{name}.fmu"],
     }
     one_of("to", to, FORMS)
-    return names[to]
+    return project_files(name) if to == "firmware" else names[to]
 
 
 def export_controller(
@@ -95,11 +105,13 @@ def export_controller(
     single: bool = False,
     reference: Reference | None = None,
     table: ArrayLike | None = None,
+    clock: float | None = None,
 ) -> Exported:
     """Write a controller for firmware or for another program.
 
     ``"c99"`` writes NAME.h and NAME.c, which allocate nothing and call no library, with test
     vectors and a program that checks them: doubles give the same bits as `Controller`.
+    ``"firmware"`` writes a project around them that builds for a board and for this computer.
     ``"library"`` writes the same functions for a program that is linked with libpiezotrack: every
     controller has this form, with the inverse of any stage sample by sample. ``"json"`` writes the
     linear parts as coefficients. ``"fmu"`` compiles the C into a unit for co-simulation (FMI 2.0,
@@ -111,7 +123,7 @@ def export_controller(
         The controller.
     folder : path-like
         Folder of the files; files of the same names are replaced.
-    to : {"c99", "library", "json", "fmu"}, optional
+    to : {"c99", "firmware", "library", "json", "fmu"}, optional
         The form.
     name : str, optional
         Of the files and functions: an identifier of C.
@@ -123,6 +135,10 @@ def export_controller(
     table : array_like, shape (n,), optional
         One period of a feedforward of your own, as `Learning.table`, in the unit of the drive: a
         sample for each interval of the controller. It takes the place of the controller's own.
+    clock : float, optional
+        Clock of the processor [Hz], of C99 and firmware: a step that could take longer than its
+        interval is refused, at an instruction a cycle on a Cortex-M with a floating-point unit for
+        its numbers.
 
     Returns
     -------
@@ -167,10 +183,23 @@ def export_controller(
         texts = library_sources(controller, name, table=played, reference=reference)
         paths = _written({key: text.encode() for key, text in texts.items()}, folder)
         return Exported(files=paths, to=to, bound=0.0, note=note)
-    if to == "fmu":
-        compiler()
-    sources = c_sources(controller, name, single=single, table=played, reference=reference)
-    files = {key: text.encode() for key, text in sources.files.items()}
+    if to == "firmware":
+        if played is not None:
+            raise ParameterError(
+                "reference or table",
+                "given with to='firmware'",
+                "neither: tables are loaded over its link",
+            )
+        texts, sources = firmware_project(controller, name, single=single)
+    else:
+        if to == "fmu":
+            compiler()
+        sources = c_sources(controller, name, single=single, table=played, reference=reference)
+        texts = sources.files
+    bounds = instructions_of(sources, repeats=controller.repetitive is not None)
+    if clock is not None:
+        check_clock(bounds, controller.dt, positive("clock", clock, "Hz"))
+    files = {key: text.encode() for key, text in texts.items()}
     if to == "fmu":
         files = {names[0]: fmu_bytes(controller, sources)}
     additions, multiplications, divisions = sources.operations
@@ -181,6 +210,8 @@ def export_controller(
         additions=additions,
         multiplications=multiplications,
         divisions=divisions,
+        instructions=bounds.usual,
+        most_instructions=bounds.most,
         bound=sources.bound,
         note=note,
     )

@@ -94,10 +94,14 @@ pub struct OnlineFeedforwardState<S> {
     /// or where it is not finite.
     before: S,
     target: Option<[f64; 3]>,
+    /// By how much the stage was off the reference at the last sample and at the one before it, in
+    /// displacement and velocity, m and m/s; 0 where the drive was within the limits.
+    off: [f64; 2],
+    off_before: [f64; 2],
 }
 
 crate::snapshot!(
-    [S: crate::Snapshot] OnlineFeedforwardState<S> { past, inverse, before, target }
+    [S: crate::Snapshot] OnlineFeedforwardState<S> { past, inverse, before, target, off, off_before }
 );
 
 impl<I: Inverse> OnlineFeedforward<I> {
@@ -118,6 +122,12 @@ impl<I: Inverse> OnlineFeedforward<I> {
         })
     }
 
+    /// The sampling interval, s.
+    #[must_use]
+    pub fn dt(&self) -> f64 {
+        self.dt
+    }
+
     /// The inverse of the stage.
     #[must_use]
     pub fn inverse(&self) -> &I {
@@ -134,7 +144,14 @@ impl<I: Inverse> OnlineFeedforward<I> {
     /// moved before.
     #[must_use]
     pub fn start(&self, inverse: I::State) -> OnlineFeedforwardState<I::State> {
-        OnlineFeedforwardState { past: None, inverse, before: inverse, target: None }
+        OnlineFeedforwardState {
+            past: None,
+            inverse,
+            before: inverse,
+            target: None,
+            off: [0.0; 2],
+            off_before: [0.0; 2],
+        }
     }
 
     /// The drive (V for a piezo stage) for the next sample of the reference.
@@ -163,6 +180,7 @@ impl<I: Inverse> OnlineFeedforward<I> {
         let lead = self.delay;
         let x = reference + lead * (v + 0.5 * lead * a) - self.offset;
         state.before = state.inverse;
+        (state.off_before, state.off) = (state.off, [0.0; 2]);
         let target = [x, v + lead * a, a];
         state.target = target.iter().all(|value| value.is_finite()).then_some(target);
         let [x, v, a] = target;
@@ -197,12 +215,13 @@ impl<I: Inverse> OnlineFeedforward<I> {
     /// it instead. [`crate::Controller::reached`] knows it.
     ///
     /// The last step is done again for the displacement at which the inverse gives this drive: the
-    /// inverse is evaluated 81 times at most, some 20 times mostly. Without a last drive, and where no displacement
-    /// has this one, nothing changes.
+    /// inverse is evaluated 42 times at most, some 8 times mostly. Without a last drive, and where no
+    /// displacement has this one, nothing changes.
     pub fn applied(&self, state: &mut OnlineFeedforwardState<I::State>, volts: f64) {
         let Some(target) = state.target else { return };
-        if let Some(inverse) = after_drive(&self.inverse, &state.before, target, volts) {
-            state.inverse = inverse;
+        let (before, off) = (&state.before, state.off_before);
+        if let Some(after) = after_drive(&self.inverse, before, target, off, self.dt, volts) {
+            (state.inverse, state.off) = after;
         }
     }
 }

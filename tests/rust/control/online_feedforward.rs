@@ -7,8 +7,8 @@ use piezotrack_control::hysteresis::{Operator, Play};
 use piezotrack_control::inverse::after_drive;
 use piezotrack_control::{
     BoucWenInverse, Creep, DahlInverse, Dynamics, FirstOrderDahlInverse, InputInverse, Inverse,
-    OnlineFeedforward, OperatorInverse, OscillatorInverse, PlayInverse, PrandtlIshlinskiiInverse,
-    ReferenceSample,
+    Limits, OnlineFeedforward, OperatorInverse, OscillatorInverse, PlayInverse,
+    PrandtlIshlinskiiInverse, ReferenceSample,
 };
 use piezotrack_core::models::{
     Experiment, InputOperator, InputStageState, Invertible, PlayHysteresis, PrandtlIshlinskiiStage,
@@ -443,50 +443,84 @@ fn the_displacement_of_a_clipped_drive_takes_few_evaluations() {
     let dt = 0.02;
     let inverse = Counted(DahlInverse::xu_li_2010().at(dt).unwrap(), core::cell::Cell::new(0));
     let (mut before, mut sum, mut most, mut clipped) = (inverse.rest(), 0, 0, 0);
+    let mut off = [0.0; 2];
     for k in 0..600 {
         let [x, v, a] = sine(0.037 * f64::from(k));
-        let (x, v, a) = (x + AMPLITUDE, 0.1 * v, 0.01 * a);
+        let target = [x + AMPLITUDE, 0.1 * v, 0.01 * a];
         let mut state = before;
-        let asked = inverse.step(&mut state, x, v, a);
+        let asked = inverse.step(&mut state, target[0], target[1], target[2]);
         let reached = asked.clamp(8.0, 50.0);
         if asked.to_bits() == reached.to_bits() {
-            before = state;
+            (before, off) = (state, [0.0; 2]);
             continue;
         }
         inverse.1.set(0);
-        let after = after_drive(&inverse, &before, [x, v, a], reached).unwrap();
+        let (after, off_after) = after_drive(&inverse, &before, target, off, dt, reached).unwrap();
         sum += inverse.1.get();
         most = most.max(inverse.1.get());
         clipped += 1;
-        // The hysteresis that it remembers gives that drive: a step back to the same displacement.
-        let mut again = before;
-        let place = found_by_bisection(&inverse, &before, [x, v, a], reached);
-        inverse.step(&mut again, place, v, a);
-        let next = |mut from| inverse.step(&mut from, x, v, a);
-        let difference = (next(after) - next(again)).abs();
-        assert!(difference < 1e-9, "{k}: {difference:e} V");
-        before = after;
+        let way = found_by_bisection(&inverse, &before, target, off, dt, reached);
+        let difference = (off_after[0] - off[0] - way).abs();
+        assert!(difference < 1e-15, "{k}: {difference:e} m");
+        assert!((off_after[1] - way / dt).abs() < 1e-12, "{k}");
+        (before, off) = (after, off_after);
     }
     assert!(clipped > 100, "{clipped}");
-    assert!(most <= 81, "{most}");
-    assert!(sum < 40 * clipped, "{sum} for {clipped}");
+    assert!(most <= 42, "{most}");
+    assert!(sum < 10 * clipped, "{sum} for {clipped}");
 }
 
-/// The displacement of a drive, by plain bisection over 200 um.
+/// One sample of the reference that no stage can follow is forgotten: the stage did not go there.
+#[test]
+fn a_jump_of_the_reference_leaves_the_feedforward_as_it_was() {
+    let dt = 1e-3;
+    let limits = Limits::new(0.0, 75.0).unwrap();
+    let voltages = |jump: f64| -> Vec<f64> {
+        let inverse = DahlInverse::xu_li_2010().at(dt).unwrap();
+        let feedforward = OnlineFeedforward::new(inverse, dt, 0.0, 0.0).unwrap();
+        let mut state = feedforward.rest();
+        let place = |k: i32| {
+            let there = 50e-6 - 0.5 * AMPLITUDE * (TAU * 1e-3 * f64::from(k)).cos();
+            there + if k == 300 { jump } else { 0.0 }
+        };
+        (0..1000)
+            .map(|k| {
+                let sample = ReferenceSample {
+                    preview: Some(place(k + 1)),
+                    ..ReferenceSample::new(place(k))
+                };
+                feedforward.step_within(&mut state, &sample, &limits)
+            })
+            .collect()
+    };
+    let (with, without) = (voltages(20e-6), voltages(0.0));
+    let largest = |range: core::ops::Range<usize>| {
+        range.map(|k| (with[k] - without[k]).abs()).fold(0.0, f64::max)
+    };
+    assert!(largest(299..302) > 75.0, "the jump is beyond the limits");
+    assert!(largest(310..1000) < 0.1, "{} V", largest(310..1000));
+}
+
+/// The way by which a stage is off for a drive, by plain bisection over 2 mm.
 fn found_by_bisection<I: Inverse>(
     inverse: &I,
     before: &I::State,
-    [_, v, a]: [f64; 3],
+    [x, v, a]: [f64; 3],
+    off: [f64; 2],
+    dt: f64,
     volts: f64,
 ) -> f64 {
-    let (mut low, mut high) = (-100e-6, 200e-6);
+    let (mut low, mut high) = (-1e-3, 1e-3);
     for _ in 0..100 {
-        let middle = 0.5 * (low + high);
+        let way = 0.5 * (low + high);
         let mut state = *before;
-        if inverse.step(&mut state, middle, v, a) < volts {
-            low = middle;
+        let faster = way / dt;
+        let asked =
+            inverse.step(&mut state, x + off[0] + way, v + faster, a + (faster - off[1]) / dt);
+        if asked < volts {
+            low = way;
         } else {
-            high = middle;
+            high = way;
         }
     }
     low

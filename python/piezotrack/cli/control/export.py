@@ -10,6 +10,7 @@ from ..command import Argument, Option, command, refuse_without_effect
 from ..option_groups import Motion
 from ..options import of_file
 from ..output import Output
+from ..values import FREQUENCY
 from .controller_files import only_controller
 
 if TYPE_CHECKING:
@@ -34,8 +35,11 @@ def export_command(
         ),
     ] = None,
     to: Annotated[
-        Literal["c99", "library", "json", "fmu"],
-        Option("C99 alone, C with libpiezotrack, coefficients, or a co-simulation unit (FMI 2.0)"),
+        Literal["c99", "firmware", "library", "json", "fmu"],
+        Option(
+            "C99 alone, a firmware project, C with libpiezotrack, coefficients, or a co-simulation "
+            "unit (FMI 2.0)"
+        ),
     ] = "c99",
     name: Annotated[
         str | None,
@@ -45,6 +49,10 @@ def export_command(
     table: Annotated[
         Path | None,
         Option("One period of a feedforward to play, as `learn` writes it", metavar="FILE"),
+    ] = None,
+    clock: Annotated[
+        float | None,
+        Option("Clock of the processor: refused where a step does not fit the interval", FREQUENCY),
     ] = None,
     *,
     motion: Motion,
@@ -62,6 +70,8 @@ def export_command(
         raise ParameterError(f"{error}; --name gives one", argument="--name") from None
     if single and to in ("json", "library"):
         raise ParameterError("--float", f"no effect with --to {to}", "it left out", verb="has")
+    if to not in ("c99", "firmware"):
+        refuse_without_effect(("clock",), f"with --to {to}")
     if reference is None:
         refuse_without_effect(("duration", "period"), "without REFERENCE")
     known = only_controller(controller, "`piezotrack tune` writes one of a model")
@@ -71,7 +81,7 @@ def export_command(
     done: list[Exported] = []
 
     def save(place: Path) -> list[Path]:
-        options: dict[str, Any] = {"to": to, "name": chosen, "single": single}
+        options: dict[str, Any] = {"to": to, "name": chosen, "single": single, "clock": clock}
         done.append(export_controller(known, place, reference=desired, table=values, **options))
         return list(done[0].files)
 
@@ -103,6 +113,8 @@ def _document(done: Exported) -> dict[str, Any]:
         "additions": done.additions,
         "multiplications": done.multiplications,
         "divisions": done.divisions,
+        "instructions": done.instructions,
+        "most_instructions": done.most_instructions,
         "bound": done.bound,
         "note": done.note,
     }

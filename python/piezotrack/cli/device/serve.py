@@ -1,4 +1,4 @@
-"""``piezotrack serve``: a stage behind the protocol of a controller, or as records of EPICS."""
+"""``piezotrack serve``: a stage behind a protocol, behind converters, or as records of EPICS."""
 
 from __future__ import annotations
 
@@ -31,11 +31,12 @@ if TYPE_CHECKING:
 
 __all__ = ["serve_command"]
 
-PORTS = {"gcs": 50000, "scpi": 5025}
+PORTS = {"gcs": 50000, "scpi": 5025, "converters": 5556}
 # Options of the other protocols.
 OTHERS = {
     "gcs": (("prefix", "device"), "with gcs"),
     "scpi": (("prefix", "device", "abandoned"), "with scpi"),
+    "converters": (("prefix", "device", "abandoned", "limits"), "with converters"),
     "epics": (
         ("host", "port", "abandoned"),
         "with epics, which listens where EPICS_CAS_INTF_ADDR_LIST and EPICS_CA_SERVER_PORT say",
@@ -46,10 +47,10 @@ OTHERS = {
 @command()
 def serve_command(
     protocol: Annotated[
-        Literal["gcs", "scpi", "epics"],
+        Literal["gcs", "scpi", "converters", "epics"],
         Argument(
             "gcs: PI's command set, over TCP; scpi: an instrument with messages as VOLT and MEAS?; "
-            "epics: records over Channel Access",
+            "converters: those of a firmware of `export`; epics: records over Channel Access",
             "PROTOCOL",
         ),
     ],
@@ -61,9 +62,13 @@ def serve_command(
         str, Option("Address to listen at; default 127.0.0.1, this computer alone", metavar="HOST")
     ] = "127.0.0.1",
     port: Annotated[
-        int | None, Option("TCP port, 0 for any free one; default 50000, of scpi 5025")
+        int | None,
+        Option("TCP port, 0 for any free one; default 50000, of scpi 5025, of converters 5556"),
     ] = None,
-    speed: Annotated[float, Option("Speed relative to real time", PLAIN)] = 1.0,
+    speed: Annotated[
+        float,
+        Option("Speed relative to real time; inf: as fast as converters are answered", PLAIN),
+    ] = 1.0,
     abandoned: Annotated[
         Literal["runs", "stops", "rests"],
         Option(
@@ -89,6 +94,9 @@ def serve_command(
             raise ParameterError("--prefix", "missing", "the start of names, as LAB:STAGE")
         with _published(device, model, limits, speed) as one:
             _epics(one, prefix)
+        return
+    if protocol == "converters":
+        _converters(model, host, PORTS[protocol] if port is None else port, speed)
         return
     stage, within = _stage(model, limits)
     place = PORTS[protocol] if port is None else port
@@ -149,6 +157,16 @@ def _scpi(stage: VirtualStage, limits: Limits | None, host: str, port: int, spee
         name, number = server.address
         low, high = device.limits
         yield f"scpi://{name}:{number}?unit=um&limits={low:g}..{high:g}V", device.limits
+
+
+def _converters(model: Path | None, host: str, port: int, speed: float) -> None:
+    from ...adapters.simulators.converters import Converters
+    from ...hardware.virtual import virtual_stage
+
+    with Converters(virtual_stage(model)[0], host=host, port=port, speed=speed) as converters:
+        name, number = converters.address
+        print(f"listening for a board at {name}:{number}", flush=True)
+        threading.Event().wait()
 
 
 @contextmanager

@@ -59,7 +59,7 @@ def dahl_inverse(
         Constant("INVERSE_FRICTION", friction, f"b0/T, {unit} for one unit of the slope"),
         Constant("INVERSE_PIECE", longest, "longest way in one piece, m"),
         Constant("INVERSE_LONGEST", min(MOST_PIECES * longest, largest), "longest way, m"),
-        Constant("DRIVE_SAME", 2.0**-21 if single else 2.0**-50, "difference that counts as none"),
+        Constant("DRIVE_SAME", 2.0**-21 if single else 2.0**-40, "difference that counts as none"),
         Constant("REFERENCE_DT", dt, "Ts, s"),
         Constant("REFERENCE_DT_SQUARED", dt * dt, "Ts^2, s^2"),
         Constant("REFERENCE_OFFSET", offset, "reading of the sensor at rest, m"),
@@ -78,6 +78,8 @@ def dahl_inverse(
             Field("inverse", "inverse", "state of the inverse"),
             Field("inverse", "before", "the same before the last sample"),
             Field("real", "target", "displacement, velocity, acceleration of the sample", 3),
+            Field("real", "off", "deviation of the stage from the reference, and its velocity", 2),
+            Field("real", "off_before", "the same a sample before", 2),
             Field("real", "past", "the last two references, m", 2),
             Field("flag", "has_target", "whether the target is finite"),
             Field("flag", "has_past", "whether there was a reference"),
@@ -245,21 +247,25 @@ static real inverse_step(NAME_inverse *state, real x, real v, real a)
 
 REMEMBER_CODE = """\
 
-/* What the inverse gives at another displacement, less the voltage that the stage got. */
-static real inverse_excess(const NAME_state *s, real x, real volts, NAME_inverse *after)
+/* What the inverse gives where the stage went another way than the reference, by `way`, less the
+   voltage that the stage got. */
+static real inverse_excess(const NAME_state *s, real way, real volts, NAME_inverse *after)
 {
+    const real faster = way / REFERENCE_DT;
     *after = s->before;
-    return inverse_step(after, x, s->target[1], s->target[2]) - volts;
+    return inverse_step(after, s->target[0] + s->off_before[0] + way, s->target[1] + faster,
+                        s->target[2] + (faster - s->off_before[1]) / REFERENCE_DT) - volts;
 }
 
-/* Remembers the voltage that the stage got in place of the last one: finds the displacement for
-   which the inverse gives it, by false position with the weights of the Illinois rule (Dowell and
-   Jarratt 1971). The inverse is evaluated 81 times at most, some 20 times mostly. */
+/* Remembers the voltage that the stage got in place of the last one: finds the way for which the
+   inverse gives it, by false position with the weights of the Illinois rule (Dowell and Jarratt
+   1971), from beyond the step of Newton's method. The inverse is evaluated 42 times at most, some 8
+   times mostly. */
 static void inverse_remember(NAME_state *s, real volts)
 {
     NAME_inverse after;
     NAME_inverse kept;
-    real outside, inside, far, near, step, same;
+    real outside, inside, far, near, way, same;
     int above, side;
     int found = 0;
     int last = -1;
@@ -267,16 +273,17 @@ static void inverse_remember(NAME_state *s, real volts)
     if (!s->has_target) {
         return;
     }
-    outside = s->target[0];
-    inside = outside;
-    far = inverse_excess(s, outside, volts, &kept);
+    outside = 0;
+    inside = 0;
+    far = inverse_excess(s, 0, volts, &kept);
     near = far;
     same = DRIVE_SAME * (magnitude(far + volts) + magnitude(volts));
     above = far > 0;
-    step = FIRST_STEP;
-    for (i = 0; i < 20 && !found; i++) {
+    way = -far * PROBE / (inverse_excess(s, PROBE, volts, &after) - far);
+    way = magnitude(way) > 0 && is_finite(way) ? (real)1.25 * way : PROBE;
+    for (i = 0; i < 8 && !found; i++) {
         for (side = 0; side < 2 && !found; side++) {
-            const real place = side == 0 ? s->target[0] - step : s->target[0] + step;
+            const real place = side == 0 ? way : -way;
             const real excess = inverse_excess(s, place, volts, &after);
             if (is_finite(excess) && (excess > 0) != above) {
                 inside = place;
@@ -285,13 +292,13 @@ static void inverse_remember(NAME_state *s, real volts)
                 found = 1;
             }
         }
-        step *= 4;
+        way *= 4;
     }
     if (!found) {
         return;
     }
     found = magnitude(near) <= same;
-    for (i = 0; i < 40 && !found; i++) {
+    for (i = 0; i < 24 && !found; i++) {
         const real crossing = outside - far * (inside - outside) / (near - far);
         const int lies = (crossing > outside && crossing < inside)
             || (crossing < outside && crossing > inside);
@@ -299,6 +306,7 @@ static void inverse_remember(NAME_state *s, real volts)
         const real excess = inverse_excess(s, place, volts, &after);
         const int beyond = (excess > 0) == above || excess != excess;
         if (magnitude(excess) <= same) {
+            inside = place;
             kept = after;
             found = 1;
         } else if (beyond) {
@@ -318,8 +326,10 @@ static void inverse_remember(NAME_state *s, real volts)
         last = beyond;
     }
     s->inverse = kept;
+    s->off[0] = s->off_before[0] + inside;
+    s->off[1] = inside / REFERENCE_DT;
 }
-""".replace("FIRST_STEP", "(real)1e-11")
+""".replace("PROBE", "(real)1e-9")
 
 ONLINE_CODE = """\
 
@@ -335,8 +345,11 @@ static void inverse_rest(NAME_state *s)
     for (i = 0; i < 3; i++) {
         s->target[i] = 0;
     }
-    s->past[0] = 0;
-    s->past[1] = 0;
+    for (i = 0; i < 2; i++) {
+        s->off[i] = 0;
+        s->off_before[i] = 0;
+        s->past[i] = 0;
+    }
     s->has_target = 0;
     s->has_past = 0;
 }
@@ -354,6 +367,10 @@ static real online_step(NAME_state *s, real reference, real next)
                          : (reference - 2 * before + first) / REFERENCE_DT_SQUARED;
     real drive;
     s->before = s->inverse;
+    s->off_before[0] = s->off[0];
+    s->off_before[1] = s->off[1];
+    s->off[0] = 0;
+    s->off[1] = 0;
     s->target[0] = @x;
     s->target[1] = @v;
     s->target[2] = a;

@@ -305,7 +305,7 @@ NAME_real NAME_step(NAME_state *s, NAME_real reference, NAME_real measured);
 /* The command for this sample: the reference, that of the next sample (NaN where it is not known,
    then the feedforward comes half a sample late), and the measurement, in m. NaN is allowed for
    each of them: see NAME_command. After a feedforward beyond the limits, and in NAME_applied, the
-   inverse is evaluated again, 81 times at most and some 20 times mostly. */
+   inverse is evaluated again, 42 times at most and some 8 times mostly. */
 NAME_real NAME_step(NAME_state *s, NAME_real reference, NAME_real next, NAME_real measured);
 """,
 }

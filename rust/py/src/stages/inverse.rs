@@ -125,7 +125,7 @@ impl PyInverse {
         a: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (x, v, a) = (samples("x", x)?, samples("v", v)?, samples("a", a)?);
-        let drive = along(self.online.inverse(), self.start, self.limits.as_ref(), [&x, &v, &a]);
+        let drive = along(&self.online, self.start, self.limits.as_ref(), [&x, &v, &a]);
         array(py, drive.map_err(|error| raise(&error))?.iter().copied())
     }
 
@@ -146,12 +146,13 @@ impl PyInverse {
 /// Voltages along a reference. A voltage beyond the limits does not reach the stage, and the inverse
 /// does not remember it.
 fn along(
-    inverse: &AnyInverse,
+    online: &OnlineFeedforward<AnyInverse>,
     mut state: AnyInverseState,
     limits: Option<&Limits>,
     [x, v, a]: [&[f64]; 3],
 ) -> Result<Vec<f64>> {
     let mut drive = room("the drive along the reference", x.len())?;
+    let (inverse, dt, mut off) = (online.inverse(), online.dt(), [0.0; 2]);
     for (k, ((&x, &v), &a)) in x.iter().zip(v).zip(a).enumerate() {
         let before = state;
         let value = inverse.step(&mut state, x, v, a);
@@ -162,8 +163,10 @@ fn along(
             )));
         }
         let reached = limits.map_or(value, |limits| limits.clip(value));
+        let off_before = core::mem::replace(&mut off, [0.0; 2]);
         if (value - reached).abs() > 0.0 {
-            state = after_drive(inverse, &before, [x, v, a], reached).unwrap_or(state);
+            (state, off) = after_drive(inverse, &before, [x, v, a], off_before, dt, reached)
+                .unwrap_or((state, off));
         }
         drive.push(value);
     }

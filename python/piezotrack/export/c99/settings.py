@@ -1,0 +1,2 @@
+def settings_of(controller, *, single):
+    return []

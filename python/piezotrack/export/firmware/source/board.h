@@ -1,0 +1,44 @@
+/*
+ * The hardware: ten functions that a board implements. host.c is a process with TCP, mps2.c an
+ * emulated Cortex-M.
+ */
+#ifndef BOARD_H
+#define BOARD_H
+
+#include <stdint.h>
+
+/* What the converters say of a sample. */
+#define BOARD_OVERRUN 1u /* the sample before was not answered in its interval */
+#define BOARD_INVALID 2u /* there is no reading */
+
+/* Starts clocks, converters, link and watchdog, with samples held back as by board_mask(1). Once
+   they are let come, the board calls firmware_sample in each sampling interval, by interrupt or
+   within board_get. */
+void board_init(void);
+
+/* Puts a code out at the DAC. Called once within each firmware_sample, and by firmware_init. */
+void board_write(uint32_t code);
+
+/* Time since the start, ms; wraps around. */
+uint32_t board_millis(void);
+
+/* The next byte of the link, or -1 where there is none. */
+int board_get(void);
+
+/* Sends a byte over the link; waits until there is room for it. */
+void board_put(char byte);
+
+/* 0 where the link is known to be lost. A serial line does not know, and returns 1. */
+int board_linked(void);
+
+/* Keeps the watchdog from a reset. */
+void board_feed(void);
+
+/* Holds firmware_sample back (1) or lets it come again (0). */
+void board_mask(int held);
+
+/* Keeps a block of bytes over a reset, or reads it back; 0 where that cannot be done. */
+int board_store(const void *image, uint32_t bytes);
+int board_recall(void *image, uint32_t bytes);
+
+#endif

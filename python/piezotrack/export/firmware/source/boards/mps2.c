@@ -1,0 +1,164 @@
+/*
+ * Arm's MPS2 board as QEMU emulates it: mps2-an386 (Cortex-M4F) and mps2-an500 (Cortex-M7). UART 0
+ * is the link; UART 1 stands for the converters: a code and a status come for each sample, whose
+ * interrupt runs the loop, and a code goes back. SysTick counts the time, the watchdog resets.
+ */
+#include "board.h"
+
+#include "firmware.h"
+
+#define REGISTER(address) (*(volatile uint32_t *)(address))
+
+struct uart {
+    volatile uint32_t data;
+    volatile uint32_t state; /* bit 0: transmitter full; bit 1: there is a byte */
+    volatile uint32_t control; /* bits 0, 1: transmitter, receiver; bit 3: its interrupt */
+    volatile uint32_t interrupts; /* bit 1: of the receiver; written: it is cleared */
+    volatile uint32_t divider;
+};
+
+#define LINK ((struct uart *)0x40004000u)
+#define CONVERTERS ((struct uart *)0x40005000u)
+#define CONVERTERS_INTERRUPT 2u
+
+#define SYSTICK_CONTROL REGISTER(0xE000E010u)
+#define SYSTICK_RELOAD REGISTER(0xE000E014u)
+#define SYSTICK_VALUE REGISTER(0xE000E018u)
+#define INTERRUPT_ENABLE REGISTER(0xE000E100u)
+#define INTERRUPT_DISABLE REGISTER(0xE000E180u)
+#define INTERRUPT_PRIORITY_0 REGISTER(0xE000E400u)
+#define SYSTICK_PRIORITY REGISTER(0xE000ED20u)
+#define WATCHDOG_LOAD REGISTER(0x40008000u)
+#define WATCHDOG_CONTROL REGISTER(0x40008008u)
+#define WATCHDOG_CLEAR REGISTER(0x4000800Cu)
+#define WATCHDOG_LOCK REGISTER(0x40008C00u)
+
+#define CLOCK_HZ 25000000u
+#define WATCHDOG_MS 1000u
+/* Bytes of a sample from the converters, and of the answer. */
+#define FRAME 5u
+#define ANSWER 4u
+
+static volatile uint32_t millis;
+static uint8_t frame[FRAME];
+static uint32_t frame_bytes;
+static uint8_t answers;
+
+void systick_handler(void);
+void converters_handler(void);
+
+void systick_handler(void)
+{
+    millis++;
+}
+
+static void send(struct uart *uart, uint32_t byte)
+{
+    while ((uart->state & 1u) != 0u) {
+        /* until there is room */
+    }
+    uart->data = byte & 255u;
+}
+
+void converters_handler(void)
+{
+    CONVERTERS->interrupts = 2u;
+    while ((CONVERTERS->state & 2u) != 0u) {
+        frame[frame_bytes] = (uint8_t)CONVERTERS->data;
+        frame_bytes++;
+        if (frame_bytes == FRAME) {
+            const uint32_t code = (uint32_t)frame[0] | ((uint32_t)frame[1] << 8)
+                | ((uint32_t)frame[2] << 16) | ((uint32_t)frame[3] << 24);
+            frame_bytes = 0;
+            answers = 1;
+            firmware_sample(code, frame[4]);
+            answers = 0;
+        }
+    }
+}
+
+/* Says how codes are meant. */
+static void tell_converters(void)
+{
+    static const real scale[CONVERTERS_NUMBERS] = CONVERTERS_SCALE;
+    const uint8_t *bytes = (const uint8_t *)scale;
+    uint32_t i;
+    send(CONVERTERS, REAL_BYTES);
+    for (i = 0; i < (uint32_t)sizeof scale; i++) {
+        send(CONVERTERS, bytes[i]);
+    }
+}
+
+void board_init(void)
+{
+    LINK->divider = 217u; /* 115200 baud */
+    LINK->control = 3u;
+    CONVERTERS->divider = 16u;
+    CONVERTERS->control = 3u | 8u;
+    tell_converters();
+    SYSTICK_RELOAD = CLOCK_HZ / 1000u - 1u;
+    SYSTICK_VALUE = 0;
+    INTERRUPT_PRIORITY_0 = 0x40u << (8u * CONVERTERS_INTERRUPT);
+    SYSTICK_PRIORITY = 0x20000000u; /* above the loop: time goes on within a step */
+    SYSTICK_CONTROL = 7u;
+    WATCHDOG_LOCK = 0x1ACCE551u;
+    WATCHDOG_LOAD = CLOCK_HZ / 1000u * WATCHDOG_MS;
+    WATCHDOG_CONTROL = 3u;
+}
+
+void board_write(uint32_t code)
+{
+    uint32_t i;
+    for (i = 0; i < ANSWER && answers != 0u; i++) {
+        send(CONVERTERS, code >> (8u * i));
+    }
+}
+
+uint32_t board_millis(void)
+{
+    return millis;
+}
+
+int board_get(void)
+{
+    return (LINK->state & 2u) != 0u ? (int)(LINK->data & 255u) : -1;
+}
+
+void board_put(char byte)
+{
+    send(LINK, (uint32_t)(unsigned char)byte);
+}
+
+int board_linked(void)
+{
+    return 1;
+}
+
+void board_feed(void)
+{
+    WATCHDOG_CLEAR = 1u;
+}
+
+void board_mask(int held)
+{
+    if (held) {
+        INTERRUPT_DISABLE = 1u << CONVERTERS_INTERRUPT;
+        __asm volatile("dsb\n isb" ::: "memory");
+    } else {
+        INTERRUPT_ENABLE = 1u << CONVERTERS_INTERRUPT;
+    }
+}
+
+int board_store(const void *image, uint32_t bytes)
+{
+    (void)image;
+    (void)bytes;
+    return 0; /* it has no memory that outlives a reset */
+}
+
+int board_recall(void *image, uint32_t bytes)
+{
+    (void)image;
+    (void)bytes;
+    return 0;
+}

@@ -1,0 +1,404 @@
+#include "firmware.h"
+
+#include "board.h"
+#include "protocol.h"
+#include "ring.h"
+
+static controller_state loop;
+static struct firmware_status status = {MODE_OFF, FAULT_NONE, 0, 0, 0, 0, SAFE_VOLTS, 0, 0};
+static real volts_table[TABLE_SAMPLES];
+static real reference_table[TABLE_SAMPLES];
+
+/* Of the table that is played or followed. */
+static uint32_t table_count; /* samples; 0: a constant reference */
+static uint32_t table_place; /* sample that comes next */
+static uint32_t table_divider;
+static uint32_t table_wait; /* intervals until the next sample */
+static uint32_t table_periods; /* periods left; 0: without an end */
+static int table_played; /* whether the voltages are the feedforward of the loop */
+static real constant; /* reference without a table, m */
+
+static uint32_t overruns_in_a_row;
+static uint32_t invalid_in_a_row;
+static uint32_t last_sample; /* ms */
+static volatile uint8_t sampled; /* a sample came since firmware_poll looked */
+
+static real not_a_number(void)
+{
+    const real zero = 0;
+    return zero / zero;
+}
+
+static int is_finite(real value)
+{
+    return value - value <= 0;
+}
+
+static int is_allowed(real volts)
+{
+    return volts >= LIMITS_LOW && volts <= LIMITS_HIGH;
+}
+
+/* Puts a voltage out: within the limits, and within the codes of the DAC. */
+static void put_out(real volts)
+{
+    real code;
+    real kept = volts;
+    if (!(kept >= LIMITS_LOW)) {
+        kept = kept < LIMITS_LOW ? LIMITS_LOW : SAFE_VOLTS;
+    } else if (kept > LIMITS_HIGH) {
+        kept = LIMITS_HIGH;
+    }
+    code = (kept - DAC_ZERO_VOLTS) * DAC_CODES_PER_VOLT + (real)0.5;
+    if (!(code >= 0)) {
+        code = 0;
+    } else if (code > DAC_CODE_MOST) {
+        code = DAC_CODE_MOST;
+    }
+    status.volts = kept;
+    board_write((uint32_t)code);
+}
+
+static int is_moving(void)
+{
+    return status.mode == MODE_HOLD || status.mode == MODE_PLAY || status.mode == MODE_RUN;
+}
+
+static void fail(enum firmware_fault fault)
+{
+    if (status.mode != MODE_FAULT) {
+        ring_end();
+        status.left = 0;
+        status.mode = MODE_FAULT;
+        status.fault = fault;
+    }
+}
+
+/* A step of the way to the safe voltage; 1 where it is reached. */
+static int step_down(real *volts)
+{
+    const real way = SAFE_VOLTS - *volts;
+    if (way > SAFE_STEP) {
+        *volts += SAFE_STEP;
+    } else if (way < -SAFE_STEP) {
+        *volts -= SAFE_STEP;
+    } else {
+        *volts = SAFE_VOLTS;
+        return 1;
+    }
+    return 0;
+}
+
+/* The voltage of the table for this interval. */
+static real play(void)
+{
+    const real volts = volts_table[table_place];
+    if (table_wait > 1u) {
+        table_wait--;
+    } else if (table_place + 1u < table_count) {
+        table_place++;
+        table_wait = table_divider;
+    } else {
+        status.mode = MODE_HOLD;
+    }
+    return volts;
+}
+
+/* A step of the loop: the reference of this sample, of the next one, and the feedforward. */
+static real follow(real reading, real *reference)
+{
+    real next = constant;
+    real forward = 0;
+    *reference = constant;
+    if (table_count > 0u) {
+        const uint32_t after = table_place + 1u < table_count ? table_place + 1u : 0u;
+        const int stays = table_periods == 1u && after == 0u;
+        *reference = reference_table[table_place];
+        next = reference_table[stays ? table_place : after];
+        forward = table_played ? volts_table[table_place] : 0;
+        if (!stays) {
+            if (after == 0u && table_periods > 1u) {
+                table_periods--;
+            }
+            table_place = after;
+        }
+        status.left = status.left > 0u ? status.left - 1u : 0u;
+    }
+    return controller_step(&loop, *reference, next, reading, forward);
+}
+
+void firmware_sample(uint32_t code, unsigned from_converters)
+{
+    const int invalid = (from_converters & BOARD_INVALID) != 0u;
+    const int overrun = (from_converters & BOARD_OVERRUN) != 0u;
+    struct ring_sample sample;
+    real volts = status.volts;
+    real reference = not_a_number();
+    int records = 1;
+    status.tick++;
+    status.reading = invalid ? not_a_number() : ADC_ZERO_METRES + (real)code * ADC_METRES_PER_CODE;
+    sample.flags = (invalid ? SAMPLE_INVALID : 0u) | (overrun ? SAMPLE_OVERRUN : 0u);
+    if (invalid && status.invalid < UINT32_MAX) {
+        status.invalid++;
+    }
+    if (overrun && status.overruns < UINT32_MAX) {
+        status.overruns++;
+    }
+    overruns_in_a_row = overrun ? overruns_in_a_row + 1u : 0u;
+    if (overruns_in_a_row >= OVERRUNS_MOST && is_moving()) {
+        fail(FAULT_OVERRUN);
+    }
+    switch (status.mode) {
+    case MODE_RAMP:
+        if (step_down(&volts)) {
+            status.mode = MODE_OFF;
+        }
+        break;
+    case MODE_PLAY:
+        if (table_place == 0u && table_wait > table_divider) {
+            records = 0; /* the first voltage, before the record */
+        } else {
+            records = table_wait == table_divider;
+            status.left = table_count - table_place - 1u;
+        }
+        volts = play();
+        break;
+    case MODE_RUN:
+        volts = follow(status.reading, &reference);
+        sample.flags |= SAMPLE_LOOP | (controller_saturated(&loop) ? SAMPLE_SATURATED : 0u);
+        invalid_in_a_row = controller_reading_ok(&loop) ? 0u : invalid_in_a_row + 1u;
+        if (invalid_in_a_row >= INVALID_MOST) {
+            fail(FAULT_READING);
+        }
+        break;
+    case MODE_FAULT:
+        (void)step_down(&volts);
+        break;
+    case MODE_OFF:
+        volts = SAFE_VOLTS;
+        break;
+    default: /* MODE_HOLD: the voltage that is there */
+        break;
+    }
+    put_out(volts);
+    status.reference = reference;
+    if (records) {
+        sample.tick = status.tick;
+        sample.reference = reference;
+        sample.volts = status.volts;
+        sample.reading = status.reading;
+        ring_add(&sample);
+    }
+    sampled = 1;
+}
+
+void firmware_init(void)
+{
+    controller_init(&loop);
+    status.volts = SAFE_VOLTS;
+    status.reading = not_a_number();
+    status.reference = not_a_number();
+#if CONTROLLER_SETTINGS > 0
+    {
+        controller_settings saved;
+        if (board_recall(&saved, (uint32_t)sizeof saved)) {
+            (void)controller_retune(&loop, &saved); /* refused where it is of another controller */
+        }
+    }
+#endif
+    put_out(SAFE_VOLTS);
+    ring_begin(0);
+    last_sample = board_millis();
+}
+
+void firmware_poll(void)
+{
+    const uint32_t now = board_millis();
+    const uint32_t since_line = protocol_poll(now);
+    board_mask(1);
+    if (sampled != 0u) {
+        sampled = 0;
+        last_sample = now;
+    }
+    if (is_moving()) {
+        if (!board_linked() || since_line > LINK_TIMEOUT_MS) {
+            fail(FAULT_LINK);
+        } else if (now - last_sample > SAMPLING_TIMEOUT_MS) {
+            fail(FAULT_SAMPLING);
+            put_out(SAFE_VOLTS); /* no sample would lead it there */
+        }
+    }
+    board_mask(0);
+    board_feed();
+}
+
+void firmware_status(struct firmware_status *there)
+{
+    board_mask(1);
+    *there = status;
+    board_mask(0);
+}
+
+/* From here on: what the protocol asks for. All of it is held back from the samples. */
+
+int firmware_hold(real volts)
+{
+    if (!is_allowed(volts) || status.mode == MODE_FAULT) {
+        return 0;
+    }
+    board_mask(1);
+    status.mode = MODE_HOLD;
+    status.left = 0;
+    ring_begin(0);
+    put_out(volts);
+    board_mask(0);
+    return 1;
+}
+
+int firmware_load(unsigned table, uint32_t first, const real *numbers, uint32_t count)
+{
+    uint32_t i;
+    if (first > TABLE_SAMPLES || count > TABLE_SAMPLES - first || status.mode == MODE_PLAY) {
+        return 0;
+    }
+    for (i = 0; i < count; i++) {
+        const real number = numbers[i];
+        if (table == TABLE_VOLTS ? !is_allowed(number) : !is_finite(number)) {
+            return 0;
+        }
+    }
+    for (i = 0; i < count; i++) {
+        board_mask(1);
+        if (table == TABLE_VOLTS) {
+            volts_table[first + i] = numbers[i];
+        } else {
+            reference_table[first + i] = numbers[i];
+        }
+        board_mask(0);
+    }
+    return 1;
+}
+
+int firmware_play(uint32_t count, uint32_t divider, uint32_t lead)
+{
+    if (count == 0u || count > TABLE_SAMPLES || divider == 0u || divider > DIVIDER_MOST
+        || lead > UINT32_MAX - divider || status.mode == MODE_FAULT) {
+        return 0;
+    }
+    board_mask(1);
+    table_count = count;
+    table_place = 0;
+    table_divider = divider;
+    table_wait = divider + lead;
+    status.left = count;
+    status.mode = MODE_PLAY;
+    ring_begin(count);
+    board_mask(0);
+    return 1;
+}
+
+static int run(uint32_t count, uint32_t periods, int played, real reference)
+{
+    if (status.mode == MODE_FAULT) {
+        return 0;
+    }
+    board_mask(1);
+    if (status.mode != MODE_RUN) {
+        if (!controller_start(&loop, status.volts)) {
+            board_mask(0);
+            return 0;
+        }
+        invalid_in_a_row = 0;
+    }
+    table_count = count;
+    table_place = 0;
+    table_periods = periods;
+    table_played = played;
+    constant = reference;
+    status.left = count == 0u || periods > UINT32_MAX / count ? 0u : count * periods;
+    status.mode = MODE_RUN;
+    ring_begin(status.left);
+    board_mask(0);
+    return 1;
+}
+
+int firmware_run(uint32_t count, uint32_t periods, int played)
+{
+    if (count == 0u || count > TABLE_SAMPLES || (played && !CONTROLLER_TAKES_VOLTS)) {
+        return 0;
+    }
+    return run(count, periods, played, 0);
+}
+
+int firmware_follow(real reference)
+{
+    return is_finite(reference) ? run(0, 0, 0, reference) : 0;
+}
+
+int firmware_stop(void)
+{
+    board_mask(1);
+    if (is_moving()) {
+        ring_end();
+        status.left = 0;
+        status.mode = MODE_RAMP;
+    }
+    board_mask(0);
+    return 1;
+}
+
+int firmware_clear(void)
+{
+    int done = 0;
+    board_mask(1);
+    if (status.mode == MODE_FAULT && !(status.volts < SAFE_VOLTS || status.volts > SAFE_VOLTS)) {
+        status.mode = MODE_OFF;
+        status.fault = FAULT_NONE;
+        done = 1;
+    }
+    board_mask(0);
+    return done;
+}
+
+int firmware_settings(real *numbers)
+{
+#if CONTROLLER_SETTINGS > 0
+    uint32_t i;
+    for (i = 0; i < CONTROLLER_SETTINGS; i++) {
+        numbers[i] = loop.settings.value[i];
+    }
+    return 1;
+#else
+    (void)numbers;
+    return 0;
+#endif
+}
+
+int firmware_retune(const real *numbers)
+{
+#if CONTROLLER_SETTINGS > 0
+    controller_settings next;
+    uint32_t i;
+    int done;
+    for (i = 0; i < CONTROLLER_SETTINGS; i++) {
+        next.value[i] = numbers[i];
+    }
+    controller_settings_seal(&next);
+    board_mask(1);
+    done = controller_retune(&loop, &next);
+    board_mask(0);
+    return done;
+#else
+    (void)numbers;
+    return 0;
+#endif
+}
+
+int firmware_save(void)
+{
+#if CONTROLLER_SETTINGS > 0
+    return board_store(&loop.settings, (uint32_t)sizeof loop.settings);
+#else
+    return 0;
+#endif
+}

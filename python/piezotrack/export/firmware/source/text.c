@@ -1,0 +1,217 @@
+#include "text.h"
+
+#include "board.h"
+
+#if REAL_BYTES == 4
+typedef uint32_t bits;
+#else
+typedef uint64_t bits;
+#endif
+
+union pattern {
+    real number;
+    bits bits;
+};
+
+#define DIGITS (2 * REAL_BYTES)
+/* Decimal exponents that are read; beyond them a number is none. */
+#define EXPONENT_MOST 400
+
+void text_put(const char *text)
+{
+    while (*text != '\0') {
+        board_put(*text);
+        text++;
+    }
+}
+
+void text_put_count(uint32_t count)
+{
+    char digits[10];
+    int n = 0;
+    do {
+        digits[n] = (char)('0' + (char)(count % 10u));
+        count /= 10u;
+        n++;
+    } while (count > 0u);
+    while (n > 0) {
+        n--;
+        board_put(digits[n]);
+    }
+}
+
+void text_put_bits(real number)
+{
+    union pattern pattern;
+    int i;
+    pattern.number = number;
+    board_put('x');
+    for (i = DIGITS - 1; i >= 0; i--) {
+        board_put("0123456789abcdef"[(pattern.bits >> (4 * i)) & 15u]);
+    }
+}
+
+void text_put_decimal(real number)
+{
+    uint32_t whole;
+    uint32_t place = 100000u;
+    int exponent = 0;
+    if (!(number - number <= 0)) {
+        text_put("nan");
+        return;
+    }
+    if (number < 0) {
+        board_put('-');
+        number = -number;
+    }
+    if (number > 0) {
+        while (number >= 10) {
+            number /= 10;
+            exponent++;
+        }
+        while (number < 1) {
+            number *= 10;
+            exponent--;
+        }
+    }
+    whole = (uint32_t)(number * 100000 + (real)0.5);
+    if (whole >= 1000000u) {
+        whole /= 10u;
+        exponent++;
+    }
+    board_put((char)('0' + (char)(whole / place)));
+    board_put('.');
+    for (place /= 10u; place > 0u; place /= 10u) {
+        board_put((char)('0' + (char)(whole / place % 10u)));
+    }
+    board_put('e');
+    if (exponent < 0) {
+        board_put('-');
+        exponent = -exponent;
+    }
+    text_put_count((uint32_t)exponent);
+}
+
+char *text_word(char **line)
+{
+    char *begin = *line;
+    char *end;
+    while (*begin == ' ') {
+        begin++;
+    }
+    end = begin;
+    while (*end != '\0' && *end != ' ') {
+        end++;
+    }
+    if (*end == ' ') {
+        *end = '\0';
+        end++;
+    }
+    *line = end;
+    return begin;
+}
+
+int text_same(const char *one, const char *other)
+{
+    while (*one != '\0' && *one == *other) {
+        one++;
+        other++;
+    }
+    return *one == *other;
+}
+
+int text_count(const char *word, uint32_t *count)
+{
+    uint32_t value = 0;
+    if (*word == '\0') {
+        return 0;
+    }
+    for (; *word != '\0'; word++) {
+        const uint32_t digit = (uint32_t)(unsigned char)*word - (uint32_t)'0';
+        if (digit > 9u || value > (UINT32_MAX - digit) / 10u) {
+            return 0;
+        }
+        value = 10u * value + digit;
+    }
+    *count = value;
+    return 1;
+}
+
+static int hexadecimal(const char *word, real *number)
+{
+    union pattern pattern;
+    int n;
+    pattern.bits = 0;
+    for (n = 0; word[n] != '\0'; n++) {
+        const char c = word[n];
+        bits digit;
+        if (c >= '0' && c <= '9') {
+            digit = (bits)(c - '0');
+        } else if (c >= 'a' && c <= 'f') {
+            digit = (bits)(c - 'a') + 10u;
+        } else {
+            return 0;
+        }
+        if (n == DIGITS) {
+            return 0;
+        }
+        pattern.bits = (pattern.bits << 4) | digit;
+    }
+    *number = pattern.number;
+    return n == DIGITS;
+}
+
+int text_number(const char *word, real *number)
+{
+    real value = 0;
+    real sign = 1;
+    int digits = 0;
+    int exponent = 0;
+    int power = 0;
+    int below = 0;
+    int down = 0;
+    if (*word == 'x') {
+        return hexadecimal(word + 1, number);
+    }
+    if (*word == '-' || *word == '+') {
+        sign = *word == '-' ? -1 : 1;
+        word++;
+    }
+    for (; (*word >= '0' && *word <= '9') || (*word == '.' && below == 0); word++) {
+        if (*word == '.') {
+            below = 1;
+        } else {
+            value = 10 * value + (real)(*word - '0');
+            exponent -= below;
+            digits++;
+        }
+    }
+    if (digits > 0 && digits < 40 && (*word == 'e' || *word == 'E')) {
+        word++;
+        if (*word == '-' || *word == '+') {
+            down = *word == '-';
+            word++;
+        }
+        if (*word == '\0') {
+            return 0;
+        }
+        for (; *word >= '0' && *word <= '9' && power < EXPONENT_MOST; word++) {
+            power = 10 * power + (*word - '0');
+        }
+    }
+    if (digits == 0 || digits >= 40 || *word != '\0') {
+        return 0;
+    }
+    exponent += down ? -power : power;
+    for (; exponent > 0; exponent--) {
+        value *= 10;
+    }
+    for (; exponent < 0; exponent++) {
+        value /= 10;
+    }
+    if (!(value - value <= 0)) {
+        return 0;
+    }
+    *number = sign * value;
+    return 1;
+}

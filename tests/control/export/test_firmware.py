@@ -1,0 +1,290 @@
+"""Firmware projects: on this computer and on emulated boards, with a simulated stage."""
+
+from __future__ import annotations
+
+import math
+import re
+import socket
+import struct
+import threading
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from boards import BOARDS, MACHINES, booted, connected, made, needs_cross
+from c_exports import DAHL, loop, needs_gcc
+from piezotrack.errors import ParameterError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+SPAN = (-2e-5, 1.5e-4)
+SAFE = 0.0
+
+
+def controller(**parts: Any) -> pt.Controller:
+    given: dict[str, Any] = {
+        "dt": 1e-3,
+        "limits": (0.0, 75.0),
+        "span": SPAN,
+        "feedback": pt.Pid.from_um(kp=0.02, ti=0.005),
+        "filters": [pt.Notch(160.0)],
+    }
+    return pt.Controller(**given | parts)
+
+
+@pytest.fixture(scope="module")
+def stage() -> Iterator[pt.hardware.Converters]:
+    with pt.hardware.Converters(pt.VirtualStage.xu_li_2010(seed=1)) as converters:
+        yield converters
+
+
+def within(condition: Any, seconds: float = 20.0) -> bool:
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_from_a_log_to_a_learnt_raster_and_a_tracked_reference(
+    board: str, tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    one = controller()
+    with booted(one, tmp_path, board, stage.address) as (address, process):
+        device = connected(address)
+        log = pt.measure(device, "decaying:2Hz,0..75V,2s", rate=500.0)
+        fit = pt.identify(log, "prandtl-ishlinskii")
+        assert fit.cost < 0.15e-6
+        line = pt.triangle(frequency=2.0, low=2e-5, high=6e-5, duration=1.0, rounding=0.2)
+        online = controller(feedforward=fit.inverse(), feedback=None, filters=[])
+        learnt = pt.learn(device, line, online, trials=5)
+        assert learnt.errors[learnt.best] < 0.3 * learnt.errors[0]
+        run = device.track(replace(one, feedforward=fit.inverse()), line)
+        # The samples are those of the loop: reference, voltage and reading belong together.
+        assert np.array_equal(run.desired, line.sample(1e-3).x)
+        assert float(np.sqrt(np.mean((run.measured - run.desired)[600:] ** 2))) < 1.5e-6
+        # A board that stops leads its output to the safe voltage, in steps that are small.
+        device.stop()
+        assert device.state().mode == "off"
+        assert stage.voltage == SAFE
+        device.hold(40.0)
+        assert within(lambda: stage.voltage > 39.9)
+        # What a client was, is gone: the link with it.
+        device._closed.set()
+        device._link.close()
+        assert within(lambda: stage.voltage == SAFE)
+        again = connected(address)
+        assert again.state().fault == "link"
+        with pytest.raises(pt.DeviceError, match="no fault"):
+            again.hold(10.0)
+        again.clear()
+        again.hold(10.0)
+        assert again.voltage == 10.0
+        again.close()
+        assert process.poll() is None
+
+
+@needs_gcc
+@pytest.mark.parametrize("single", [False, True], ids=["double", "float"])
+@pytest.mark.parametrize(
+    "parts", [{}, {"feedforward": DAHL.inverse(), "filters": []}], ids=["voltages", "online"]
+)
+def test_the_loop_of_a_board_is_that_of_the_session(
+    parts: dict[str, Any], single: bool, tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    """To the bit in double: the same readings give the same voltages."""
+    one = controller(**parts)
+    with booted(one, tmp_path, "host", stage.address, single=single) as (address, _):
+        device = connected(address)
+        device.hold(20.0)
+        run = device.track(one, "sine:2Hz,10..60um,1s")
+        recorded = device.log()
+        device.close()
+    session = one.start(present=20.0)
+    online = one.feedforward is not None
+    x = np.append(run.desired, run.desired[-1])
+    commands = [
+        session.step(
+            x[k],
+            run.measured[k],
+            preview=x[k + 1] if online else None,
+            feedforward=None if online else 0.0,
+        )
+        for k in range(run.t.size)
+    ]
+    assert np.array_equal(recorded.u, run.voltage)
+    difference = float(np.max(np.abs(np.array(commands) - run.voltage)))
+    assert difference < 5e-3 if single else difference == 0.0
+
+
+@needs_cross
+@pytest.mark.parametrize("board", MACHINES)
+@pytest.mark.parametrize("single", [False, True], ids=["double", "float"])
+@pytest.mark.parametrize("name", ["PID", "filters and jumps", "state space", "Dahl", "repetitive"])
+def test_a_step_on_a_board_has_the_bits_and_the_instructions_that_are_stated(
+    name: str, single: bool, board: str, tmp_path: Path
+) -> None:
+    one = replace(loop(name), span=SPAN) if loop(name).span is None else loop(name)
+    done = pt.control.export_controller(one, tmp_path, to="firmware", name="axis", single=single)
+    printed = made(tmp_path, f"count-{board}")
+    counts = dict(re.findall(r"(mean|worst|state bytes|steps apart) (\d+)", printed))
+    assert int(counts["steps apart"]) == 0
+    assert int(counts["state bytes"]) == done.state_bytes
+    assert done.instructions is not None
+    assert done.most_instructions is not None
+    if single or board == "m7":
+        # The floating-point unit has numbers of this size.
+        assert done.most_instructions / 20 < int(counts["worst"]) <= done.most_instructions
+        if done.most_instructions == done.instructions:
+            assert int(counts["mean"]) > 0.5 * done.instructions
+
+
+class Clock:
+    """Converters that send what a test says, and keep what is answered [V]."""
+
+    def __init__(self, one: pt.Controller) -> None:
+        low, high = one.limits
+        self._scale = (high - low) / (2**20 - 1)
+        self._socket = socket.create_server(("127.0.0.1", 0))
+        self.address: tuple[str, int] = self._socket.getsockname()[:2]
+        self.status, self.volts, self.going = 0, [math.nan], True
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> Clock:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Wait for the board to go, which is killed before."""
+        self._thread.join()
+        self._socket.close()
+
+    def _run(self) -> None:
+        link, _ = self._socket.accept()
+        with link:
+            link.recv(1 + 7 * 8, socket.MSG_WAITALL)
+            while True:
+                while not self.going:
+                    time.sleep(0.001)
+                try:
+                    link.sendall(struct.pack("<IB", 2**19, self.status))
+                    answer = link.recv(4, socket.MSG_WAITALL)
+                except OSError:
+                    return
+                if len(answer) < 4:
+                    return
+                self.volts.append(struct.unpack("<I", answer)[0] * self._scale)
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("status", "mode", "fault"), [(1, "hold", "overrun"), (2, "run", "reading")]
+)
+def test_samples_that_are_late_or_have_no_reading_lead_to_the_safe_voltage(
+    status: int, mode: str, fault: str, tmp_path: Path
+) -> None:
+    one = controller()
+    with Clock(one) as clock, booted(one, tmp_path, "host", clock.address) as (address, _):
+        device = connected(address)
+        device.hold(30.0)
+        if mode == "run":
+            device.follow(5e-5)
+        clock.status = status
+        assert within(lambda: device.state().fault == fault)
+        assert within(lambda: clock.volts[-1] == SAFE)
+        # On the way there no step is larger than that of half a second over the range.
+        steps = np.abs(np.diff(clock.volts))
+        way = steps[np.flatnonzero(steps > 0.0)[-100:]]
+        assert 0.14 < way.max() < 0.16
+        clock.status = 0
+        device.clear()
+        assert device.state().mode == "off"
+        device.close()
+
+
+@needs_gcc
+def test_samples_that_do_not_come_are_a_fault(tmp_path: Path) -> None:
+    one = controller()
+    pt.control.export_controller(one, tmp_path, to="firmware", name="axis")
+    text = (tmp_path / "Makefile").read_text().replace("CFLAGS +=", "CFLAGS :=")
+    (tmp_path / "Makefile").write_text(text)
+    with Clock(one) as clock, booted(one, tmp_path, "host", clock.address) as (address, _):
+        device = connected(address)
+        device.hold(30.0)
+        clock.going = False
+        assert within(lambda: device.state().fault == "sampling")
+        clock.going = True
+        assert within(lambda: clock.volts[-1] == SAFE)
+        device.close()
+
+
+@needs_gcc
+def test_lines_that_make_no_sense_are_answered(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    with booted(controller(), tmp_path, "host", stage.address) as (address, process):
+        host, port = address.removeprefix("firmware://").split(":")
+        with socket.create_connection((host, int(port))) as link, link.makefile("rw") as lines:
+            for line, answer in {
+                "ping": "ok",
+                "": "error command",
+                "hold": "error hold",
+                "hold 75.1": "error hold",
+                "hold nan": "error hold",
+                "hold 1e9999999999": "error hold",
+                "hold x7ff8000000000000": "error hold",
+                "hold 1.25e1": "ok",
+                "load voltage 4096 1": "error table",
+                "load voltage 4000 " + "1 " * 49: "error number",
+                "load sideways 0 1": "error table",
+                "load voltage 0 -0.001": "error table",
+                "load voltage 4294967295 1 2": "error table",
+                "play 0 1 0": "error play",
+                "play 4097 1 0": "error play",
+                "play 2 1 4294967295": "error play",
+                "play 99999999999 1 0": "error play",
+                "run 1 1 2": "error run",
+                "read 0 257": "error samples",
+                "clear": "error clear",
+                "x" * 2000: "error line",
+                "ping ": "ok",
+            }.items():
+                lines.write(f"{line}\n")
+                lines.flush()
+                assert lines.readline().startswith(answer), line
+        assert process.poll() is None
+
+
+def test_a_wrong_address_is_told() -> None:
+    with pytest.raises(ParameterError, match="firmware://HOST:PORT"):
+        pt.hardware.connect("firmware:")
+    with pytest.raises(pt.DeviceError, match="does not answer"):
+        pt.hardware.connect("firmware://127.0.0.1:1")
+    with pt.hardware.VirtualScpi(pt.hardware.connect("virtual:")) as other:  # type: ignore[arg-type]
+        place = f"{other.address[0]}:{other.address[1]}"
+        with pytest.raises(pt.DeviceError, match="id"):
+            pt.hardware.connect(f"firmware://{place}?timeout=0.2s")
+
+
+def test_what_cannot_be_a_firmware_is_refused(tmp_path: Path) -> None:
+    export = pt.control.export_controller
+    with pytest.raises(ParameterError, match="span"):
+        export(controller(span=None), tmp_path, to="firmware")
+    with pytest.raises(ParameterError, match="a file of the firmware"):
+        export(controller(), tmp_path, to="firmware", name="ring")
+    with pytest.raises(ParameterError, match="loaded over its link"):
+        export(controller(), tmp_path, to="firmware", table=np.ones(100))
+    fast = controller(dt=1e-5, feedforward=DAHL.inverse())
+    with pytest.raises(ParameterError, match="expected a step within 10 us"):
+        export(fast, tmp_path, to="firmware", clock=168e6)
+    assert not list(tmp_path.iterdir())
+    slow = controller(dt=1e-3, feedforward=DAHL.inverse())
+    assert export(slow, tmp_path, to="firmware", clock=168e6).most_instructions > 10_000  # type: ignore[operator]
