@@ -7,6 +7,7 @@ import doctest
 import io
 import re
 import shlex
+import subprocess
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -53,6 +54,7 @@ TYPED = [page for page in PAGES if any(b.language in ("python", "console") for b
 LONG = (
     "control",
     "evidence",
+    "firmware",
     "first-controller",
     "hardware",
     "identification",
@@ -123,6 +125,8 @@ ADDRESSES: dict[str, str] = {}
 
 def python(block: Block, names: dict[str, Any], where: str) -> str:
     """Run a block, with prompts or without; return what it prints."""
+    for address, real in ADDRESSES.items():
+        block = block._replace(code=block.code.replace(f'"{address}"', f'"{real}"'))
     if ">>>" in block.code:
         report: list[str] = []
         test = doctest.DocTestParser().get_doctest(block.code, names, where, where, 0)
@@ -144,8 +148,17 @@ def console(block: Block, where: str, served: contextlib.ExitStack) -> Iterator[
         if not line.startswith("$ "):
             continue
         name, *arguments = shlex.split(line.removeprefix("$ "), comments=True)
-        # Other commands, as pip and make, are not those of the package.
-        if name == "piezotrack" and arguments[-1] == "&":
+        # Other commands, as pip, are not those of the package; a firmware is made and run.
+        if name == "make" and "-C" in arguments:
+            subprocess.run([name, *arguments], check=True, capture_output=True)
+        elif name.endswith("-host"):
+            converters = ADDRESSES["converters://127.0.0.1"].rpartition(":")[2]
+            board = subprocess.Popen([f"./{name}", "0", converters], stdout=subprocess.PIPE, text=True)
+            served.enter_context(board)
+            served.callback(board.kill)
+            assert board.stdout is not None
+            ADDRESSES[f"firmware://127.0.0.1:{arguments[0]}"] = board.stdout.readline().strip()
+        elif name == "piezotrack" and arguments[-1] == "&":
             _, protocol, *options = arguments[:-1]
             _, ADDRESSES[f"{protocol}://127.0.0.1"], _ = served.enter_context(
                 serving(*options, protocol=protocol)

@@ -6,6 +6,7 @@ import math
 import struct
 import threading
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -394,7 +395,14 @@ class FirmwareDevice:
         )
 
     def close(self) -> None:
-        """Close the connection: the board leads its output to the safe voltage."""
+        """Lead the output to the safe voltage, and close the connection.
+
+        A connection that is lost is a fault, which leads it there too.
+        """
+        if not self._closed.is_set():
+            with suppress(DeviceError):
+                if self.state().mode != "fault":
+                    self.stop()
         self._closed.set()
         with self._lock:
             self._link.close()

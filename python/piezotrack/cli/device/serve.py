@@ -36,7 +36,7 @@ PORTS = {"gcs": 50000, "scpi": 5025, "converters": 5556}
 OTHERS = {
     "gcs": (("prefix", "device"), "with gcs"),
     "scpi": (("prefix", "device", "abandoned"), "with scpi"),
-    "converters": (("prefix", "device", "abandoned", "limits"), "with converters"),
+    "converters": (("prefix", "device", "abandoned"), "with converters"),
     "epics": (
         ("host", "port", "abandoned"),
         "with epics, which listens where EPICS_CAS_INTF_ADDR_LIST and EPICS_CA_SERVER_PORT say",
@@ -95,12 +95,10 @@ def serve_command(
         with _published(device, model, limits, speed) as one:
             _epics(one, prefix)
         return
-    if protocol == "converters":
-        _converters(model, host, PORTS[protocol] if port is None else port, speed)
-        return
     stage, within = _stage(model, limits)
     place = PORTS[protocol] if port is None else port
-    serving = _scpi if protocol == "scpi" else partial(_gcs, abandoned=abandoned)
+    servers = {"scpi": _scpi, "converters": _converters}
+    serving = servers.get(protocol, partial(_gcs, abandoned=abandoned))
     with serving(stage, within, host, place, speed) as (address, (low, high)):
         print(f"listening from {low:g} to {high:g} V at {address}", flush=True)
         threading.Event().wait()
@@ -159,14 +157,15 @@ def _scpi(stage: VirtualStage, limits: Limits | None, host: str, port: int, spee
         yield f"scpi://{name}:{number}?unit=um&limits={low:g}..{high:g}V", device.limits
 
 
-def _converters(model: Path | None, host: str, port: int, speed: float) -> None:
+@contextmanager
+def _converters(
+    stage: VirtualStage, limits: Limits | None, host: str, port: int, speed: float
+) -> Served:
     from ...adapters.simulators.converters import Converters
-    from ...hardware.virtual import virtual_stage
 
-    with Converters(virtual_stage(model)[0], host=host, port=port, speed=speed) as converters:
+    with Converters(stage, host=host, port=port, speed=speed) as converters:
         name, number = converters.address
-        print(f"listening for a board at {name}:{number}", flush=True)
-        threading.Event().wait()
+        yield f"converters://{name}:{number}", stage.amplifier.limits if limits is None else limits
 
 
 @contextmanager
