@@ -42,6 +42,7 @@ def export_command(
         Option("Name of files and functions; default that of CONTROLLER", metavar="NAME"),
     ] = None,
     single: Annotated[bool, Option("Numbers of 4 bytes in place of 8", names=("--float",))] = False,
+    fixed: Annotated[bool, Option("Gains that are constants, not settings of NAME_retune")] = False,
     table: Annotated[
         Path | None,
         Option("One period of a feedforward to play, as `learn` writes it", metavar="FILE"),
@@ -62,6 +63,8 @@ def export_command(
         raise ParameterError(f"{error}; --name gives one", argument="--name") from None
     if single and to in ("json", "library"):
         raise ParameterError("--float", f"no effect with --to {to}", "it left out", verb="has")
+    if fixed and to != "c99":
+        raise ParameterError("--fixed", f"no effect with --to {to}", "it left out", verb="has")
     if reference is None:
         refuse_without_effect(("duration", "period"), "without REFERENCE")
     known = only_controller(controller, "`piezotrack tune` writes one of a model")
@@ -71,7 +74,7 @@ def export_command(
     done: list[Exported] = []
 
     def save(place: Path) -> list[Path]:
-        options: dict[str, Any] = {"to": to, "name": chosen, "single": single}
+        options: dict[str, Any] = {"to": to, "name": chosen, "single": single, "fixed": fixed}
         done.append(export_controller(known, place, reference=desired, table=values, **options))
         return list(done[0].files)
 
