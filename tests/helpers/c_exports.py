@@ -30,6 +30,11 @@ needs_linux = pytest.mark.skipif(
     reason="units are compiled by gcc on Linux, x86-64",
 )
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-ffp-contract=off")
+# What a step has to pass besides; programs around it need not.
+STEP = (
+    *STRICT,
+    *("-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wshadow"),
+)
 
 PI = pt.Pid.from_um(kp=0.05, ti=0.02)
 SLIDING = pt.control.SlidingMode(switching=3.0, layer=20e-6, ti=0.05, td=0.01, tf=0.03)

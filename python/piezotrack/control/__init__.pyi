@@ -1,6 +1,7 @@
 # The public names and their homes, each written once: type checkers read them here, and
 # _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
 from .._support.statistics import ErrorStatistics as ErrorStatistics
+from ..export.c99.settings import settings_of as settings_of
 from ..export.write import Exported as Exported
 from ..export.write import export_controller as export_controller
 from .comparing.compare import compare_controllers as compare_controllers

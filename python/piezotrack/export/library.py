@@ -170,8 +170,8 @@ HEADER = """\
  * sampling interval, NAME_free at the end. The controller is one of libpiezotrack, which is linked
  * with it; a step does not allocate. The functions are those of piezotrack export --to c99.
  */
-#ifndef @GUARD_H
-#define @GUARD_H
+#ifndef NAME_H
+#define NAME_H
 
 #include "piezotrack.h"
 
@@ -219,7 +219,7 @@ SOURCE = """\
  */
 #include <math.h>
 
-#include "@file.h"
+#include "NAME.h"
 
 @settings
 int NAME_init(NAME_state *s)

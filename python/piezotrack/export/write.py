@@ -103,6 +103,7 @@ def export_controller(
     to: To = "c99",
     name: str = "controller",
     single: bool = False,
+    fixed: bool = False,
     reference: Reference | None = None,
     table: ArrayLike | None = None,
     clock: float | None = None,
@@ -129,6 +130,8 @@ def export_controller(
         Of the files and functions: an identifier of C.
     single : bool, optional
         Numbers are floats, not doubles.
+    fixed : bool, optional
+        The gains are constants of the C99, not settings that ``NAME_retune`` changes.
     reference : Reference, optional
         Motion that repeats: the feedforward is then played from a table of one settled period.
         C99 and FMU need it for every feedforward other than that of a Dahl stage.
@@ -165,6 +168,9 @@ def export_controller(
     expect("controller", controller, Controller, "pt.Controller")
     expect("reference", reference, (Reference, type(None)), "a Reference, as pt.sine(...)")
     single = _core.as_truth("single", single)
+    fixed = _core.as_truth("fixed", fixed)
+    if fixed and to != "c99":
+        raise ParameterError("fixed", f"True with to={to!r}", "False, that is of to='c99'")
     names = export_files(to, name)
     played = feedforward_table(controller, reference, table)
     note = _clipped(controller, played or [])
@@ -183,6 +189,7 @@ def export_controller(
         texts = library_sources(controller, name, table=played, reference=reference)
         paths = _written({key: text.encode() for key, text in texts.items()}, folder)
         return Exported(files=paths, to=to, bound=0.0, note=note)
+    chosen: dict[str, bool] = {"single": single, "fixed": fixed}
     if to == "firmware":
         if played is not None:
             raise ParameterError(
@@ -190,11 +197,13 @@ def export_controller(
                 "given with to='firmware'",
                 "neither: tables are loaded over its link",
             )
-        texts, sources = firmware_project(controller, name, single=single)
+        texts, sources = firmware_project(controller, name, **chosen)
     else:
         if to == "fmu":
             compiler()
-        sources = c_sources(controller, name, single=single, table=played, reference=reference)
+            # A unit has no way to be told other settings.
+            chosen["fixed"] = True
+        sources = c_sources(controller, name, table=played, reference=reference, **chosen)
         texts = sources.files
     bounds = instructions_of(sources, repeats=controller.repetitive is not None)
     if clock is not None:

@@ -46,6 +46,7 @@ def export_command(
         Option("Name of files and functions; default that of CONTROLLER", metavar="NAME"),
     ] = None,
     single: Annotated[bool, Option("Numbers of 4 bytes in place of 8", names=("--float",))] = False,
+    fixed: Annotated[bool, Option("Gains that are constants, not settings of NAME_retune")] = False,
     table: Annotated[
         Path | None,
         Option("One period of a feedforward to play, as `learn` writes it", metavar="FILE"),
@@ -71,7 +72,7 @@ def export_command(
     if single and to in ("json", "library"):
         raise ParameterError("--float", f"no effect with --to {to}", "it left out", verb="has")
     if to not in ("c99", "firmware"):
-        refuse_without_effect(("clock",), f"with --to {to}")
+        refuse_without_effect(("clock", "fixed"), f"with --to {to}")
     if reference is None:
         refuse_without_effect(("duration", "period"), "without REFERENCE")
     known = only_controller(controller, "`piezotrack tune` writes one of a model")
@@ -81,7 +82,8 @@ def export_command(
     done: list[Exported] = []
 
     def save(place: Path) -> list[Path]:
-        options: dict[str, Any] = {"to": to, "name": chosen, "single": single, "clock": clock}
+        options: dict[str, Any] = {"to": to, "name": chosen, "clock": clock}
+        options |= {"single": single, "fixed": fixed}
         done.append(export_controller(known, place, reference=desired, table=values, **options))
         return list(done[0].files)
 

@@ -2,104 +2,11 @@
 
 from __future__ import annotations
 
+from .tree import choices_of, joined
+
 __all__ = ["check_code"]
 
-COMMON = """\
-/*
- * Runs vectors.csv through NAME_step and prints the largest difference to what the controller of
- * piezotrack gives. Returns 0 where all are within the bound and at most @flags flags differ.
- *
- *     cc -std=c99 -O2 -ffp-contract=off -o check check.c @file.c@link && ./check vectors.csv
- */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "@file.h"
-
-#define COLUMNS 15
-#define BOUND @bound /* largest difference allowed; 0: all bits are the same */
-
-static NAME_state state;
-
-static double difference(double found, double expected)
-{
-    return found > expected ? found - expected : expected - found;
-}
-
-static int read_line(FILE *file, double *columns)
-{
-    char line[1024];
-    char *place = line;
-    int i;
-    if (fgets(line, sizeof line, file) == NULL) {
-        return 0;
-    }
-    for (i = 0; i < COLUMNS; i++) {
-        char *end;
-        columns[i] = strtod(place, &end);
-        if (end == place) {
-            return 0;
-        }
-        place = *end == ',' ? end + 1 : end;
-    }
-    return 1;
-}
-
-int main(int count, char **arguments)
-{
-    const char *name = count > 1 ? arguments[1] : "vectors.csv";
-    FILE *file = fopen(name, "r");
-    char title[1024];
-    double in[COLUMNS];
-    double largest = 0;
-    long steps = 0;
-    long flags = 0;
-    long worst = 0;
-    if (file == NULL || fgets(title, sizeof title, file) == NULL) {
-        fprintf(stderr, "%s: cannot be read\\n", name);
-        return 2;
-    }
-    NAME_init(&state);
-    while (read_line(file, in)) {
-        double d;
-        int i;
-        if (in[5] > 0) {
-            NAME_reset(&state);
-        }
-        @call
-        for (i = 0; i < 4; i++) {
-            const double found[] = {state.last.volts, state.last.unclipped, state.last.feedback,
-                                    state.last.repetitive};
-            d = difference(found[i], in[7 + i]);
-            if (!(d <= largest)) {
-                largest = d;
-                worst = steps;
-            }
-        }
-        flags += state.last.saturated != (in[12] > 0);
-        flags += state.last.measurement_ok != (in[13] > 0);
-        flags += state.last.reference_ok != (in[14] > 0);
-        if (in[6] == in[6]) {
-            NAME_applied(&state, (NAME_real)in[6]);
-        }
-        steps++;
-    }
-    fclose(file);
-    printf("steps %ld, largest difference %.3g at step %ld, flags that differ %ld, ",
-           steps, largest, worst, flags);
-    printf("state %lu bytes\\n", (unsigned long)sizeof state);
-    return steps > 0 && largest <= BOUND && flags <= @flags ? 0 : 1;
-}
-"""
-CALLS = {
-    "given": """\
-NAME_step(&state, (NAME_real)in[1], (NAME_real)in[3], (NAME_real)in[4]);""",
-    "table": """\
-NAME_step(&state, (NAME_real)in[1], (NAME_real)in[3]);""",
-    "online": """\
-NAME_step(&state, (NAME_real)in[1], (NAME_real)in[2], (NAME_real)in[3]);""",
-}
+FORWARD = {"given": (), "table": ("FORWARD_TABLE",), "online": ("FORWARD_ONLINE",)}
 
 
 def check_code(forward: str, bound: float, flags: int, link: str = "") -> str:
@@ -121,8 +28,9 @@ def check_code(forward: str, bound: float, flags: int, link: str = "") -> str:
     str
         The program, with the names of its files open.
     """
-    pieces = {"@call": CALLS[forward], "@bound": repr(bound), "@flags": str(flags), "@link": link}
-    code = COMMON
-    for key, piece in pieces.items():
-        code = code.replace(key, piece)
-    return code
+    bounds = (
+        f"#define BOUND {bound!r} /* largest difference allowed; 0: all bits are the same */\n"
+        f"#define FLAGS {flags} /* flags that may differ */\n"
+    )
+    code = joined("check.c", choices_of(FORWARD[forward]), {"bounds.h": bounds})
+    return code.replace("@flags", str(flags)).replace("@link", link)

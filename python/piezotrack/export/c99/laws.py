@@ -1,35 +1,93 @@
-"""Feedback laws in C, line by line those of rust/control."""
+"""Numbers and states of the feedback laws in C, whose functions are in source/laws."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from .text import Constant, Field, Operations, Part
+from .text import Constant, Field, Operations, Part, Setting, Size
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     Numbers = Mapping[str, Sequence[float]]
 
-__all__ = ["damping", "disturbance_observer", "no_law", "pid", "sliding_mode", "state_space"]
+__all__ = [
+    "Scale",
+    "along_operations",
+    "dahl_observer",
+    "dahl_operator",
+    "damping",
+    "disturbance_observer",
+    "pid",
+    "sliding_mode",
+    "state_space",
+]
+
+# Terms of the power series of an operator of the observer, as in source/laws/dahl_observer.c.
+TERMS = 6
+# A number without a range of its own: this many times larger or smaller than that of the design.
+WIDE = 2.0**20
 
 
-def no_law() -> Part:
-    """Make no feedback: tracking by feedforward alone."""
-    return Part(title="no feedback", code="")
+class Scale(NamedTuple):
+    """Unit and size of the gains of a law.
+
+    Attributes
+    ----------
+    unit : str
+        Unit of the drive.
+    most : float
+        The largest gain: the whole range of the limits for a millionth of the span.
+    range : float
+        Range of the limits.
+    """
+
+    unit: str
+    most: float
+    range: float
+
+    def gain(self, name: str, value: float, comment: str) -> Setting:
+        """Make a gain from the error to the drive."""
+        most = max(self.most, 2.0 * abs(value))
+        return Setting(name, value, comment, f"{self.unit}/m", -most, most)
 
 
-def pid(numbers: Numbers, unit: str) -> Part:
+def share(name: str, value: float, comment: str, most: float = 1.0) -> Setting:
+    """Make a number from 0 to 1, or to `most`."""
+    return Setting(name, value, comment, "1", min(0.0, value), max(most, value))
+
+
+def signed(name: str, value: float, comment: str, unit: str) -> Setting:
+    """Make a number that keeps its sign, and is never 0 where it is none."""
+    ends = sorted((value / WIDE, value * WIDE)) if value else (-WIDE, WIDE)
+    return Setting(name, value, comment, unit, *ends)
+
+
+def free(name: str, value: float | Sequence[float], comment: str, unit: str = "1") -> Setting:
+    """Make numbers of any sign."""
+    every = [value] if isinstance(value, (int, float)) else value
+    most = WIDE * (max(abs(one) for one in every) or 1.0)
+    return Setting(name, value, comment, unit, -most, most)
+
+
+def coefficient(name: str, value: float, comment: str, most: float) -> Setting:
+    """Make a coefficient of a stable filter."""
+    most = max(most, abs(value))
+    return Setting(name, value, comment, "1", -most, most)
+
+
+def pid(numbers: Numbers, scale: Scale) -> Part:
     """Make the incremental PID with back-calculation."""
     proportional, integral, derivative, tracking = numbers["pid"]
-    first = "" if integral else PD_FIRST
+    unit = scale.unit
     return Part(
-        title="incremental PID with back-calculation antiwindup",
-        constants=(
-            Constant("PID_PROPORTIONAL", proportional, f"Kp, {unit}/m"),
-            Constant("PID_INTEGRAL", integral, f"Kp Ts/Ti, {unit}/m"),
-            Constant("PID_DERIVATIVE", derivative, f"Kp Td/Ts, {unit}/m"),
-            Constant("PID_TRACKING", tracking, "Ts/Tt, of the antiwindup"),
+        file="laws/pid.c",
+        chooses=("LAW_ANY", "LAW_PID"),
+        settings=(
+            scale.gain("PID_PROPORTIONAL", proportional, "Kp"),
+            scale.gain("PID_INTEGRAL", integral, "Kp Ts/Ti"),
+            scale.gain("PID_DERIVATIVE", derivative, "Kp Td/Ts"),
+            share("PID_TRACKING", tracking, "Ts/Tt, of the antiwindup", 2.0),
         ),
         fields=(
             Field("real", "pid_volts", f"output, {unit}"),
@@ -37,74 +95,28 @@ def pid(numbers: Numbers, unit: str) -> Part:
             Field("real", "pid_e2", "the error before it, m"),
             Field("flag", "pid_begun", "whether there was an error"),
         ),
-        code=PID_CODE.replace("@first", first),
         operations=Operations(7, 4),
     )
 
 
-PD_FIRST = """
-    if (!s->pid_begun && !(s->pid_volts < 0 || s->pid_volts > 0)) {
-        /* nothing would ever make up for what the first error asks for */
-        s->pid_volts = PID_PROPORTIONAL * error;
-    }"""
-
-PID_CODE = """\
-static void pid_start(NAME_state *s, real volts)
-{
-    s->pid_volts = volts;
-    s->pid_e1 = 0;
-    s->pid_e2 = 0;
-    s->pid_begun = 0;
-}
-
-static void pid_rest(NAME_state *s)
-{
-    pid_start(s, 0);
-}
-
-static real pid_step(NAME_state *s, const struct sample *in)
-{
-    const real error = in->error;
-    /* the first error stands for the earlier ones too: no derivative kick */
-    const real e1 = s->pid_begun ? s->pid_e1 : error;
-    const real e2 = s->pid_begun ? s->pid_e2 : error;
-    const real rise = error - e1;
-    const real bend = rise - (e1 - e2);
-    const real change = PID_PROPORTIONAL * rise + PID_INTEGRAL * error + PID_DERIVATIVE * bend
-        + PID_TRACKING * in->excess;
-    real volts;
-@first
-    volts = s->pid_volts + change;
-    if (is_finite(volts)) {
-        s->pid_volts = volts;
-        s->pid_e1 = error;
-        s->pid_e2 = e1;
-        s->pid_begun = 1;
-    } else {
-        /* overflow: hold the output, start again from the next error */
-        s->pid_begun = 0;
-    }
-    return s->pid_volts;
-}
-"""
-
-
-def state_space(numbers: Numbers, unit: str) -> Part:
+def state_space(numbers: Numbers, scale: Scale) -> Part:
     """Make the law in state space."""
     n = len(numbers["b"])
     back = "back" in numbers
-    constants = [
-        Constant("LAW_A", numbers["a"], "A, row by row"),
-        Constant("LAW_B", numbers["b"], "B"),
-        Constant("LAW_C", numbers["c"], "C"),
-        Constant("LAW_D", numbers["d"][0], f"D, {unit}/m"),
+    unit = scale.unit
+    settings = [
+        free("LAW_A", numbers["a"], "A, row by row"),
+        free("LAW_B", numbers["b"], "B"),
+        free("LAW_C", numbers["c"], "C"),
+        scale.gain("LAW_D", numbers["d"][0], "D"),
     ]
     if back:
-        constants.append(Constant("LAW_BACK", numbers["back"], "l, of the antiwindup"))
-    code = STATE_SPACE_CODE.replace("@advance", WITH_BACK if back else WITHOUT_BACK)
+        settings.append(free("LAW_BACK", numbers["back"], "l, of the antiwindup"))
     return Part(
-        title=f"law in state space, {n} state{'s' if n > 1 else ''}",
-        constants=tuple(constants),
+        file="laws/state_space.c",
+        chooses=("LAW_ANY", "LAW_SPACE", *(["BACK"] if back else [])),
+        sizes=(Size("LAW_STATES", n, "states"),),
+        settings=tuple(settings),
         fields=(
             Field("real", "law_x", "the states", n),
             Field("real", "law_error", "the last error, m"),
@@ -113,7 +125,6 @@ def state_space(numbers: Numbers, unit: str) -> Part:
             Field("flag", "law_begun", "whether there was an error"),
             Field("flag", "law_starts", "whether there is an output to begin with"),
         ),
-        code=code.replace("@n", str(n)),
         operations=_state_space_operations(n, back=back),
     )
 
@@ -127,92 +138,20 @@ def _state_space_operations(n: int, *, back: bool) -> Operations:
     return rows + dot + dot + Operations(1, 1) + output
 
 
-WITH_BACK = """\
-    for (i = 0; i < @n; i++) {
-        next[i] += LAW_BACK[i] * excess;
-    }"""
-WITHOUT_BACK = """\
-    if (excess * (law_dot(LAW_C, next) - law_dot(LAW_C, s->law_x)) < 0) {
-        return; /* it would move the command further beyond the limit */
-    }"""
-
-STATE_SPACE_CODE = """\
-static real law_dot(const real *a, const real *b)
-{
-    real sum = 0;
-    int i;
-    for (i = 0; i < @n; i++) {
-        sum = sum + a[i] * b[i];
-    }
-    return sum;
-}
-
-static void law_rest(NAME_state *s)
-{
-    int i;
-    for (i = 0; i < @n; i++) {
-        s->law_x[i] = 0;
-    }
-    s->law_error = 0;
-    s->law_first = 0;
-    s->law_offset = 0;
-    s->law_begun = 0;
-    s->law_starts = 0;
-}
-
-static void law_start(NAME_state *s, real volts)
-{
-    law_rest(s);
-    s->law_first = volts;
-    s->law_starts = 1;
-}
-
-/* Advances the states by the last sample, whose error and excess are known now. */
-static void law_advance(NAME_state *s, real error, real excess)
-{
-    real next[@n];
-    int i;
-    for (i = 0; i < @n; i++) {
-        next[i] = law_dot(&LAW_A[@n * i], s->law_x) + LAW_B[i] * error;
-    }
-@advance
-    for (i = 0; i < @n; i++) {
-        s->law_x[i] = next[i];
-    }
-}
-
-static real law_step(NAME_state *s, const struct sample *in)
-{
-    real volts;
-    if (s->law_begun) {
-        law_advance(s, s->law_error, in->excess);
-    } else if (s->law_starts) {
-        s->law_offset = s->law_first - LAW_D * in->error;
-    }
-    s->law_error = in->error;
-    s->law_begun = 1;
-    volts = law_dot(LAW_C, s->law_x) + LAW_D * in->error + s->law_offset;
-    if (is_finite(volts)) {
-        return volts;
-    }
-    law_rest(s); /* overflow: start again */
-    return 0;
-}
-"""
-
-
-def sliding_mode(numbers: Numbers, unit: str) -> Part:
+def sliding_mode(numbers: Numbers, scale: Scale) -> Part:
     """Make sliding mode control with a boundary layer."""
     switching, gain, integral, derivative, fresh = numbers["sliding-mode"]
-    begin = SLIDING_INTEGRAL if integral > 0.0 else SLIDING_NO_INTEGRAL
+    unit = scale.unit
+    most = max(scale.range, 2.0 * switching)
     return Part(
-        title="sliding mode control with a boundary layer",
-        constants=(
-            Constant("SLIDING_SWITCHING", switching, f"eta, the largest output, {unit}"),
-            Constant("SLIDING_GAIN", gain, f"eta/phi, inside of the layer, {unit}/m"),
-            Constant("SLIDING_INTEGRAL", integral, "Ts/Ti"),
-            Constant("SLIDING_DERIVATIVE", derivative, "Td/Ts"),
-            Constant("SLIDING_FRESH", fresh, "share of a new difference in the filtered one"),
+        file="laws/sliding_mode.c",
+        chooses=("LAW_ANY", "LAW_SLIDING"),
+        settings=(
+            Setting("SLIDING_SWITCHING", switching, "eta, the largest output", unit, 0.0, most),
+            signed("SLIDING_GAIN", gain, "eta/phi, inside of the layer", f"{unit}/m"),
+            share("SLIDING_INTEGRAL", integral, "Ts/Ti", WIDE),
+            share("SLIDING_DERIVATIVE", derivative, "Td/Ts", WIDE),
+            share("SLIDING_FRESH", fresh, "share of a new difference in the filtered one"),
         ),
         fields=(
             Field("real", "sliding_integral", "integral part of the surface, m"),
@@ -223,84 +162,21 @@ def sliding_mode(numbers: Numbers, unit: str) -> Part:
             Field("flag", "sliding_begun", "whether there was an error"),
             Field("flag", "sliding_starts", "whether there is an output to begin with"),
         ),
-        code=SLIDING_CODE.replace("@begin", begin),
         operations=Operations(8, 6),
     )
 
 
-SLIDING_INTEGRAL = """\
-    const real inside = within(s->sliding_base, SLIDING_SWITCHING);
-    s->sliding_integral = inside / SLIDING_GAIN - error * (1 + SLIDING_INTEGRAL);
-    s->sliding_base -= inside;"""
-SLIDING_NO_INTEGRAL = """\
-    s->sliding_base -= within(SLIDING_GAIN * error, SLIDING_SWITCHING);"""
-
-SLIDING_CODE = """\
-static void sliding_start(NAME_state *s, real volts)
-{
-    s->sliding_integral = 0;
-    s->sliding_change = 0;
-    s->sliding_error = 0;
-    s->sliding_base = volts;
-    s->sliding_volts = volts;
-    s->sliding_begun = 0;
-    s->sliding_starts = 1;
-}
-
-static void sliding_rest(NAME_state *s)
-{
-    sliding_start(s, 0);
-    s->sliding_starts = 0;
-}
-
-/* The first output is the one to begin with: as much of it as can be is integral. */
-static void sliding_begin(NAME_state *s, real error)
-{
-@begin
-}
-
-static real sliding_step(NAME_state *s, const struct sample *in)
-{
-    const real error = in->error;
-    const real old = s->sliding_begun ? s->sliding_error : error;
-    real change, step, integral, surface, asked, volts;
-    if (!s->sliding_begun && s->sliding_starts) {
-        sliding_begin(s, error);
-    }
-    s->sliding_starts = 0;
-    change = s->sliding_change + SLIDING_FRESH * (error - old - s->sliding_change);
-    step = SLIDING_INTEGRAL * error;
-    integral = s->sliding_integral + step;
-    surface = error + SLIDING_DERIVATIVE * change + integral;
-    if (!is_finite(surface)) {
-        s->sliding_begun = 0;
-        s->sliding_change = 0;
-        return s->sliding_volts;
-    }
-    asked = SLIDING_GAIN * surface;
-    volts = within(asked, SLIDING_SWITCHING);
-    /* beyond the layer or the limits, the integral does not go further out */
-    if (!((volts - asked) * step < 0 || in->excess * step < 0)) {
-        s->sliding_integral = integral;
-    }
-    s->sliding_change = change;
-    s->sliding_error = error;
-    s->sliding_begun = 1;
-    s->sliding_volts = volts + s->sliding_base;
-    return s->sliding_volts;
-}
-"""
-
-
-def disturbance_observer(numbers: Numbers, unit: str, inner: str) -> Part:
-    """Make the disturbance observer around the law whose functions begin with `inner`."""
+def disturbance_observer(numbers: Numbers, scale: Scale) -> Part:
+    """Make the disturbance observer around a PID or sliding mode control."""
     fresh, pole, inverse = numbers["disturbance-observer"]
+    unit = scale.unit
     return Part(
-        title="disturbance observer",
-        constants=(
-            Constant("OBSERVER_FRESH", fresh, "1 - q, of the filter of the estimate"),
-            Constant("OBSERVER_POLE", pole, "p, of the nominal plant"),
-            Constant("OBSERVER_INVERSE", inverse, f"1/(g (1 - p)), {unit}/m"),
+        file="laws/disturbance_observer.c",
+        chooses=("LAW_DISTURBANCE", "TOLD_APPLIED", "TOLD_FEEDFORWARD"),
+        settings=(
+            share("OBSERVER_FRESH", fresh, "1 - q, of the filter of the estimate"),
+            share("OBSERVER_POLE", pole, "p, of the nominal plant"),
+            signed("OBSERVER_INVERSE", inverse, "1/(g (1 - p))", f"{unit}/m"),
         ),
         fields=(
             Field("real", "observer_disturbance", f"d, {unit}"),
@@ -311,84 +187,23 @@ def disturbance_observer(numbers: Numbers, unit: str, inner: str) -> Part:
             Field("flag", "observer_begun", "whether there was a sample"),
             Field("flag", "observer_starts", "whether there is an output to begin with"),
         ),
-        code=OBSERVER_CODE.replace("@inner", inner),
         operations=Operations(6, 4),
     )
 
 
-OBSERVER_CODE = """\
-static void observer_rest(NAME_state *s)
-{
-    @inner_rest(s);
-    s->observer_disturbance = 0;
-    s->observer_error = 0;
-    s->observer_feedforward = 0;
-    s->observer_first = 0;
-    s->observer_volts = 0;
-    s->observer_begun = 0;
-    s->observer_starts = 0;
-}
-
-static void observer_start(NAME_state *s, real volts)
-{
-    observer_rest(s);
-    s->observer_first = volts;
-    s->observer_volts = volts;
-    s->observer_starts = 1;
-}
-
-/* The disturbance that explains the last sample; while the command is clipped it gets no larger in
-   the direction that moves the command further beyond the limit. */
-static void observer_observe(NAME_state *s, const struct sample *in)
-{
-    const real needed = -OBSERVER_INVERSE * (in->error - OBSERVER_POLE * s->observer_error);
-    const real found = needed - (in->applied - s->observer_feedforward);
-    const real step = OBSERVER_FRESH * (found - s->observer_disturbance);
-    const real next = s->observer_disturbance + step;
-    if (!(in->excess * step > 0 && magnitude(next) > magnitude(s->observer_disturbance))) {
-        s->observer_disturbance = next;
-    }
-}
-
-static real observer_step(NAME_state *s, const struct sample *in)
-{
-    real inside, volts;
-    if (s->observer_begun) {
-        observer_observe(s, in);
-    }
-    inside = @inner_step(s, in);
-    if (s->observer_starts) {
-        /* a bumpless start is a disturbance that is forgotten as it is observed */
-        s->observer_starts = 0;
-        s->observer_disturbance = inside - s->observer_first;
-    }
-    volts = inside - s->observer_disturbance;
-    if (is_finite(volts)) {
-        s->observer_error = in->error;
-        s->observer_feedforward = in->feedforward;
-        s->observer_begun = 1;
-        s->observer_volts = volts;
-    } else {
-        /* overflow: hold the output, observe again from the next sample on */
-        s->observer_disturbance = 0;
-        s->observer_begun = 0;
-    }
-    return s->observer_volts;
-}
-"""
-
-
-def damping(numbers: Numbers, unit: str) -> Part:
+def damping(numbers: Numbers, scale: Scale) -> Part:
     """Make the damping filter of the measurement beside the PID."""
     b0, b1, b2, a1, a2 = numbers["damping"]
+    unit = scale.unit
     return Part(
-        title="damping by a filter of the measurement",
-        constants=(
-            Constant("DAMPING_B0", b0, f"K = (b0 + b1/z + b2/z^2)/(1 + a1/z + a2/z^2), {unit}/m"),
-            Constant("DAMPING_B1", b1, f"{unit}/m"),
-            Constant("DAMPING_B2", b2, f"{unit}/m"),
-            Constant("DAMPING_A1", a1, "of the poles"),
-            Constant("DAMPING_A2", a2, "of the poles"),
+        file="laws/damping.c",
+        chooses=("LAW_DAMPED", "TOLD_MEASURED"),
+        settings=(
+            scale.gain("DAMPING_B0", b0, "K = (b0 + b1/z + b2/z^2)/(1 + a1/z + a2/z^2)"),
+            scale.gain("DAMPING_B1", b1, "b1"),
+            scale.gain("DAMPING_B2", b2, "b2"),
+            coefficient("DAMPING_A1", a1, "of the poles", 2.0),
+            coefficient("DAMPING_A2", a2, "of the poles", 1.0),
         ),
         fields=(
             Field("real", "damping_s1", f"memory of the filter, {unit}"),
@@ -397,52 +212,65 @@ def damping(numbers: Numbers, unit: str) -> Part:
             Field("real", "damping_volts", f"the last output, {unit}"),
             Field("flag", "damping_begun", "whether there was a reading"),
         ),
-        code=DAMPING_CODE,
         operations=Operations(6, 5),
     )
 
 
-DAMPING_CODE = """\
-static void damping_forget(NAME_state *s)
-{
-    s->damping_s1 = 0;
-    s->damping_s2 = 0;
-    s->damping_origin = 0;
-    s->damping_begun = 0;
-}
+def dahl_observer(numbers: Numbers, scale: Scale) -> Part:
+    """Make the observer of a Dahl hysteresis around a PID."""
+    pole, fresh, correction, a1, a2, gain, longest = numbers["dahl-observer"]
+    unit = scale.unit
+    return Part(
+        file="laws/dahl_observer.c",
+        chooses=("LAW_DAHL", "DAHL_OPERATOR", "TOLD_MEASURED", "TOLD_APPLIED"),
+        settings=(
+            share("OBSERVER_POLE", pole, "p, of the linear part"),
+            signed("OBSERVER_FRESH", fresh, "g (1 - p)", f"m/{unit}"),
+            share("OBSERVER_CORRECTION", correction, "L, share that corrects the estimate"),
+            signed("OBSERVER_PIECE", longest, "longest way in one piece", "m"),
+            free("HYSTERESIS_A1", a1, "a1", "1/m"),
+            free("HYSTERESIS_A2", a2, "a2", "1/m^2"),
+            free("HYSTERESIS_GAIN", gain, "curvature of the branch from rest", f"{unit}/m^2"),
+        ),
+        fields=(
+            Field("real", "hysteresis_force", f"estimated hysteresis w, {unit}"),
+            Field("real", "hysteresis_slope", f"its slope along the path, {unit}/m"),
+            Field("real", "observer_displacement", "estimated displacement, m"),
+            Field("real", "observer_place", "place of the operator on its path, m"),
+            Field("real", "observer_first", f"output to begin with, {unit}"),
+            Field("real", "observer_volts", f"the last output, {unit}"),
+            Field("flag", "observer_begun", "whether there was a sample"),
+            Field("flag", "observer_starts", "whether there is an output to begin with"),
+        ),
+        # One piece: the way, and what is left of it.
+        operations=along_operations(TERMS) + Operations(11, 5, 1),
+    )
 
-static void damping_start(NAME_state *s, real volts)
-{
-    pid_start(s, volts);
-    damping_forget(s);
-    s->damping_volts = volts;
-}
 
-static void damping_rest(NAME_state *s)
-{
-    pid_rest(s);
-    damping_forget(s);
-    s->damping_volts = 0;
-}
+def dahl_operator(terms: int) -> Part:
+    """Make the function that moves a Dahl operator along a monotone piece of its path.
 
-static real damping_step(NAME_state *s, const struct sample *in)
-{
-    real place, damping, volts;
-    if (!s->damping_begun) {
-        s->damping_origin = in->measured;
-        s->damping_begun = 1;
-    }
-    place = in->measured - s->damping_origin;
-    damping = DAMPING_B0 * place + s->damping_s1;
-    s->damping_s1 = DAMPING_B1 * place - DAMPING_A1 * damping + s->damping_s2;
-    s->damping_s2 = DAMPING_B2 * place - DAMPING_A2 * damping;
-    volts = pid_step(s, in) + damping;
-    if (is_finite(volts)) {
-        s->damping_volts = volts;
-    } else {
-        /* overflow: hold the output, count from the next reading */
-        damping_forget(s);
-    }
-    return s->damping_volts;
-}
-"""
+    Parameters
+    ----------
+    terms : int
+        Of the longest power series.
+
+    Returns
+    -------
+    Part
+        It comes before the observer and the inverse.
+    """
+    reciprocals = [1.0 / max(k, 1) for k in range(terms + 1)]
+    return Part(
+        file="dahl_operator.c",
+        chooses=("DAHL_OPERATOR",),
+        sizes=(Size("DAHL_TERMS", terms, "terms of the longest series"),),
+        constants=(Constant("DAHL_RECIPROCAL", reciprocals, "1/k, k from 1"),),
+    )
+
+
+def along_operations(terms: int) -> Operations:
+    """Count the operations of a piece of the way."""
+    series = 2 + (terms - 2)
+    horner = (terms - 1) + (terms - 2)
+    return Operations(series + horner + 2, 3 + 2 * (terms - 2) + 2 * horner + 2)

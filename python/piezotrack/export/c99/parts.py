@@ -11,11 +11,20 @@ from ..._support.units import of_drive
 from ...control.laws.neural_network import NetworkInverse
 from ...control.loop.preconditions import check_period, check_turns
 from ...errors import DataError, ParameterError, ShapeError
-from .dahl import dahl_observer
-from .input import filters, helpers, readings
-from .inverse import dahl_inverse, voltage_table
-from .laws import damping, disturbance_observer, pid, sliding_mode, state_space
-from .loop import Shape, loop, sample
+from .input import filters, numbers, readings
+from .inverse import INVERSE_TERMS, dahl_inverse, square_root, voltage_table
+from .laws import TERMS as OBSERVER_TERMS
+from .laws import (
+    Scale,
+    dahl_observer,
+    dahl_operator,
+    damping,
+    disturbance_observer,
+    pid,
+    sliding_mode,
+    state_space,
+)
+from .loop import Shape, loop
 from .repetitive import repetitive
 
 if TYPE_CHECKING:
@@ -27,24 +36,21 @@ if TYPE_CHECKING:
     from ...references.reference import Reference
     from .text import Part
 
-__all__ = ["coefficients_of", "feedforward_table", "parts_of", "shape_of"]
+__all__ = ["coefficients_of", "feedforward_table", "gains_of", "parts_of", "shape_of"]
 
 Numbers = dict[str, Any]
-# With what the functions of a law begin, and what it is told besides error and excess.
-FUNCTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
-    "pid": ("pid", ()),
-    "state-space": ("law", ()),
-    "lead-lag": ("law", ()),
-    "sliding-mode": ("sliding", ()),
-    "disturbance-observer": ("observer", ("applied", "feedforward")),
-    "perturbation-estimator": ("observer", ("applied", "feedforward")),
-    "hysteresis-observer": ("observer", ("measured", "applied")),
-    "integral-resonant": ("damping", ("measured",)),
-    "positive-position": ("damping", ("measured",)),
-    "positive-velocity-position": ("damping", ("measured",)),
-}
+# The laws that have a form in C, unless what is inside of them has none.
+WRITTEN = frozenset(
+    (
+        *("pid", "state-space", "lead-lag", "sliding-mode", "disturbance-observer"),
+        *("perturbation-estimator", "hysteresis-observer", "integral-resonant"),
+        *("positive-position", "positive-velocity-position"),
+    )
+)
 # The coefficients of a law that has a form in C: of itself, or of the law inside.
 FIRST = {"pid", "b", "sliding-mode"}
+# A gain that takes the command through its range for this share of the span is the largest.
+FINEST = 2.0**-20
 # Longest table: its text has 50 bytes a sample.
 MOST_SAMPLES = 1_000_000
 
@@ -140,7 +146,6 @@ def shape_of(controller: Controller, table: Sequence[float] | None) -> Shape:
         A part has no form in C.
     """
     learner = controller.repetitive
-    name, sample = _law_of(controller)
     forward = "given"
     if table is not None:
         forward = "table"
@@ -148,8 +153,7 @@ def shape_of(controller: Controller, table: Sequence[float] | None) -> Shape:
         _check_online(controller)
         forward = "online"
     return Shape(
-        law=name,
-        sample=sample,
+        law=_law_of(controller),
         repeats=learner is not None,
         pauses=learner is not None and learner.pause,
         filtered=bool(controller.filters),
@@ -157,14 +161,14 @@ def shape_of(controller: Controller, table: Sequence[float] | None) -> Shape:
     )
 
 
-def _law_of(controller: Controller) -> tuple[str, tuple[str, ...]]:
-    """With what the functions of a law begin, and what it is told besides error and excess."""
+def _law_of(controller: Controller) -> str:
+    """Kind of the law; empty without one."""
     law = controller.feedback
     if law is None:
-        return "", ()
+        return ""
     # The core has no coefficients of what needs more than arithmetic.
-    if law.info.name in FUNCTIONS and coefficients_of(controller).keys() & FIRST:
-        return FUNCTIONS[law.info.name]
+    if law.info.name in WRITTEN and coefficients_of(controller).keys() & FIRST:
+        return law.info.name
     what = law.info.title
     if (stage := getattr(law, "stage", None)) is not None:
         what += f" of a {stage.info.title} stage"
@@ -198,7 +202,7 @@ def _check_online(controller: Controller) -> None:
 def parts_of(
     controller: Controller, table: Sequence[float] | None, *, single: bool
 ) -> tuple[Part, ...]:
-    """Make the parts of a controller in C, each before what calls it.
+    """Make the parts of a controller in C.
 
     Parameters
     ----------
@@ -219,18 +223,13 @@ def parts_of(
     ParameterError
         A part has no form in C.
     """
-    numbers, unit = coefficients_of(controller), of_drive("V", controller.drive_unit)
-    if controller.drive_unit == "N":
-        unit = "N"
+    unit = _unit(controller)
     shape = shape_of(controller, table)
-    low, high = numbers["span"]
-    parts = [readings(low, high, controller.max_jump)]
-    if shape.filtered:
-        parts.append(filters(numbers["filters"]))
-    if shape.law:
-        parts += [sample(shape), *_laws(numbers, unit)]
-    if shape.repeats:
-        parts.append(repetitive(numbers, unit))
+    parts = gains_of(controller)
+    told = [name for one in parts for name in one.chooses if name.startswith("TOLD")]
+    terms = (
+        [OBSERVER_TERMS] if "LAW_DAHL" in {name for one in parts for name in one.chooses} else []
+    )
     if table is not None:
         parts.append(voltage_table(table, unit))
     elif shape.forward == "online":
@@ -238,25 +237,62 @@ def parts_of(
         assert inverse is not None
         coefficients = inverse._begun(controller.dt).coefficients()
         assert coefficients is not None
-        settings = (float(controller.dt), float(inverse.offset), float(inverse.delay))
-        parts.append(dahl_inverse(coefficients, *settings, unit, single=single))
-    parts.append(loop(controller.limits, unit, shape))
-    others = "".join(one.code for one in parts)
-    return helpers(controller.limits, unit, others, single=single), *parts
+        given = (float(controller.dt), float(inverse.offset), float(inverse.delay))
+        terms.append(INVERSE_TERMS)
+        parts += [square_root(), dahl_inverse(coefficients, *given, unit, single=single)]
+    if terms:
+        parts.append(dahl_operator(max(terms)))
+    low, high = coefficients_of(controller)["span"]
+    parts += [
+        numbers(controller.limits, unit, single=single, repeats=shape.repeats),
+        readings(low, high, controller.max_jump),
+    ]
+    additions = int("TOLD_APPLIED" in told) + int("TOLD_FEEDFORWARD" in told and shape.repeats)
+    return *parts, loop(controller.limits, unit, shape, additions)
 
 
-def _laws(numbers: Numbers, unit: str) -> list[Part]:
+def _unit(controller: Controller) -> str:
+    return "N" if controller.drive_unit == "N" else of_drive("V", controller.drive_unit)
+
+
+def gains_of(controller: Controller) -> list[Part]:
+    """Make the parts with numbers that are tuned: filters, feedback law, repetitive part.
+
+    Parameters
+    ----------
+    controller : Controller
+        The controller.
+
+    Returns
+    -------
+    list of Part
+        The parts, in the order of their numbers among the settings.
+
+    Raises
+    ------
+    ParameterError
+        The law has no form in C.
+    """
+    found, unit = coefficients_of(controller), _unit(controller)
+    (low, high), (bottom, top) = controller.limits, found["span"]
+    scale = Scale(unit, (high - low) / (FINEST * (top - bottom)), high - low)
+    parts = [filters(found["filters"])] if found["filters"] else []
+    if _law_of(controller):
+        parts += _laws(found, scale)
+    if controller.repetitive is not None:
+        parts.append(repetitive(found, unit))
+    return parts
+
+
+def _laws(found: Numbers, scale: Scale) -> list[Part]:
     """Make the parts of the feedback law, the inner one first."""
-    if "b" in numbers:
-        return [state_space(numbers, unit)]
-    inner, name = pid, "pid"
-    if "sliding-mode" in numbers:
-        inner, name = sliding_mode, "sliding"
-    laws = [inner(numbers, unit)]
-    if "disturbance-observer" in numbers:
-        laws.append(disturbance_observer(numbers, unit, name))
-    if "dahl-observer" in numbers:
-        laws.append(dahl_observer(numbers, unit))
-    if "damping" in numbers:
-        laws.append(damping(numbers, unit))
+    if "b" in found:
+        return [state_space(found, scale)]
+    laws = [(sliding_mode if "sliding-mode" in found else pid)(found, scale)]
+    if "disturbance-observer" in found:
+        laws.append(disturbance_observer(found, scale))
+    if "dahl-observer" in found:
+        laws.append(dahl_observer(found, scale))
+    if "damping" in found:
+        laws.append(damping(found, scale))
     return laws

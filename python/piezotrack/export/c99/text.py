@@ -19,16 +19,23 @@ __all__ = [
     "Field",
     "Operations",
     "Part",
+    "Setting",
+    "Size",
     "array_lines",
+    "comment_of",
     "constant_text",
     "field_text",
     "in_order",
     "literal",
     "named",
     "named_in",
+    "range_literal",
+    "size_text",
     "state_bytes",
 ]
 
+# The largest float.
+FLOAT_MOST = float(np.finfo(np.float32).max)
 # Numbers in a line of an array.
 IN_A_LINE = 2
 
@@ -51,19 +58,82 @@ class Constant(NamedTuple):
     comment: str
 
 
+class Size(NamedTuple):
+    """A count of the C file, which sizes arrays.
+
+    Attributes
+    ----------
+    name : str
+        In capitals.
+    value : int
+        The count.
+    comment : str
+        What it counts.
+    """
+
+    name: str
+    value: int
+    comment: str
+
+
+class Setting(NamedTuple):
+    """A number of the law, or an array of them, that is changed while the controller runs.
+
+    Attributes
+    ----------
+    name : str
+        In capitals.
+    value : float or sequence of float
+        The number or the numbers, of the design.
+    comment : str
+        What it is.
+    unit : str
+        Its unit; 1 for none.
+    low, high : float
+        Range of each of the numbers.
+    """
+
+    name: str
+    value: float | Sequence[float]
+    comment: str
+    unit: str
+    low: float
+    high: float
+
+    @property
+    def numbers(self) -> list[float]:
+        """The numbers, one for a single one."""
+        alone = isinstance(self.value, (int, float))
+        return [float(one) for one in ([self.value] if alone else self.value)]  # type: ignore[union-attr]
+
+    @property
+    def names(self) -> list[str]:
+        """A name for each of the numbers, as an operator sees it."""
+        name = self.name.lower()
+        if isinstance(self.value, (int, float)):
+            return [name]
+        return [f"{name}_{i}" for i in range(len(self.value))]
+
+    @property
+    def constant(self) -> Constant:
+        """The same as a constant."""
+        comment = self.comment if self.unit == "1" else f"{self.comment}, {self.unit}"
+        return Constant(self.name, self.value, comment)
+
+
 class Field(NamedTuple):
     """A field of the state.
 
     Attributes
     ----------
-    kind : {"inverse", "real", "count", "flag"}
-        The state of an inverse, a number, a count or a truth value.
+    kind : {"settings", "inverse", "real", "count", "flag"}
+        The settings, the state of an inverse, a number, a count or a truth value.
     name : str
         Its name.
     comment : str
         What it is, with its unit.
     entries : int
-        Of an array; 0 for a single one.
+        Of an array, or numbers of the settings; 0 for a single one.
     """
 
     kind: str
@@ -102,21 +172,30 @@ class Part:
 
     Attributes
     ----------
-    title : str
-        What it is, for a comment.
-    code : str
-        Its functions; NAME_ stands for the name of the export.
+    file : str
+        The file of the tree with its functions; NAME_ stands for the name of the export.
     constants : tuple of Constant
         Numbers that they use.
+    settings : tuple of Setting
+        Numbers that are changed while the controller runs.
+    sizes : tuple of Size
+        Counts that they use.
+    chooses : tuple of str
+        Choices of the tree that it makes.
+    text : str
+        What comes below the constants.
     fields : tuple of Field
         What it keeps from step to step.
     operations : Operations
         Of a step with valid inputs that does not saturate.
     """
 
-    title: str
-    code: str
+    file: str
     constants: tuple[Constant, ...] = ()
+    settings: tuple[Setting, ...] = ()
+    sizes: tuple[Size, ...] = ()
+    chooses: tuple[str, ...] = ()
+    text: str = ""
     fields: tuple[Field, ...] = ()
     operations: Operations = NOTHING
 
@@ -127,8 +206,26 @@ def named(name: str, code: str) -> str:
 
 
 def named_in(name: str, text: str) -> str:
-    """Put the name of an export into a whole file."""
-    return named(name, text).replace("@GUARD", name.upper()).replace("@file", name)
+    """Put the name of an export into a whole file: in capitals for what the compiler replaces."""
+    text = re.sub(r"\bNAME(?=_(H|SETTINGS)\b)", name.upper(), text)
+    return re.sub(r"\bNAME(?=\.[ch]\b)", name, named(name, text))
+
+
+def comment_of(text: str) -> str:
+    """Make a text one line that a comment of C can hold.
+
+    Neither its end, nor the begin of another, a trigraph, the end of a line or what is not ASCII
+    comes through.
+
+    Examples
+    --------
+    >>> from piezotrack.export.c99.text import comment_of
+    >>> comment_of("stage */ ??/")
+    'stage * / ? ?/'
+    """
+    plain = "".join(one if " " <= one <= "~" and one != "\\" else "_" for one in text)
+    plain = re.sub(r"\?(?=\?)", "? ", plain)
+    return re.sub(r"\*(?=/)", "* ", re.sub(r"/(?=\*)", "/ ", plain))
 
 
 def literal(value: float, name: str, *, single: bool) -> str:
@@ -173,6 +270,14 @@ def literal(value: float, name: str, *, single: bool) -> str:
     return f"{_short(rounded)}f /* {value!r} */"
 
 
+def range_literal(value: float, *, single: bool) -> str:
+    """Write an end of a range: of floats that which is nearest."""
+    if single:
+        with np.errstate(over="ignore", under="ignore"):
+            value = float(np.clip(np.float32(value), -FLOAT_MOST, FLOAT_MOST))
+    return literal(value, "range", single=single)
+
+
 def _short(value: float) -> str:
     """Return the hexadecimal form without the zeros at the end of the digits."""
     return re.sub(r"\.?0*p", "p", value.hex(), count=1)
@@ -189,6 +294,11 @@ def constant_text(constant: Constant, *, single: bool) -> str:
     return f"{above}static const real {constant.name}[{size}] = {{\n{body}\n}};\n"
 
 
+def size_text(size: Size) -> str:
+    """Write the definition of a count."""
+    return f"#define {size.name} {size.value}u /* {size.comment} */\n"
+
+
 def array_lines(numbers: Iterable[str]) -> str:
     """Write the entries of an array, each with a comma before its comment."""
     entries = [
@@ -199,6 +309,7 @@ def array_lines(numbers: Iterable[str]) -> str:
 
 
 TYPES = {
+    "settings": "NAME_settings",
     "inverse": "NAME_inverse",
     "real": "NAME_real",
     "count": "uint32_t",
@@ -210,7 +321,7 @@ OF_INVERSE = 5
 
 def field_text(field: Field) -> str:
     """Write the declaration of a field."""
-    array = f"[{field.entries}]" if field.entries else ""
+    array = f"[{field.entries}]" if field.entries and field.kind != "settings" else ""
     return f"    {TYPES[field.kind]} {field.name}{array}; /* {field.comment} */\n"
 
 
@@ -235,6 +346,11 @@ def state_bytes(fields: Iterable[Field], *, single: bool) -> int:
         The bytes, with the padding at the end.
     """
     real = 4 if single else 8
-    sizes = {"inverse": OF_INVERSE * real, "real": real, "count": 4, "flag": 1}
-    whole = sum(sizes[one.kind] * max(one.entries, 1) for one in fields)
+    sizes = {"settings": real, "inverse": OF_INVERSE * real, "real": real, "count": 4, "flag": 1}
+    whole = 0
+    for one in fields:
+        whole += sizes[one.kind] * max(one.entries, 1)
+        if one.kind == "settings":
+            # Version, layout and checksum, and the padding behind.
+            whole += -(-12 // real) * real
     return -(-whole // real) * real

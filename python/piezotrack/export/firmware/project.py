@@ -60,7 +60,9 @@ def project_files(name: str) -> list[str]:
     return own + [path for path, _ in _sources(SOURCE)]
 
 
-def firmware_project(controller: Controller, name: str, *, single: bool = False) -> Project:
+def firmware_project(
+    controller: Controller, name: str, *, single: bool = False, fixed: bool = False
+) -> Project:
     """Write a firmware project around a controller.
 
     Parameters
@@ -72,6 +74,8 @@ def firmware_project(controller: Controller, name: str, *, single: bool = False)
         With which functions and files of the controller begin.
     single : bool, optional
         Numbers are floats, not doubles.
+    fixed : bool, optional
+        All numbers are constants: there are no settings.
 
     Returns
     -------
@@ -100,7 +104,7 @@ def firmware_project(controller: Controller, name: str, *, single: bool = False)
         )
     span = _sensor_span(controller)
     inside = _without_table(controller)
-    sources = c_sources(inside, name, single=single)
+    sources = c_sources(inside, name, single=single, fixed=fixed)
     rows = rows_of(inside)[:VECTORS]
     texts = {path: text for path, text in sources.files.items() if path.startswith(f"{name}.")}
     texts["configuration.h"] = _configuration(inside, sources, span, single=single)
@@ -322,11 +326,16 @@ static inline int controller_reading_ok(const controller_state *loop)
     return loop->last.measurement_ok;
 }
 
-#ifdef @CAPITALS_SETTINGS
 #define CONTROLLER_SETTINGS @CAPITALS_SETTINGS
+#if CONTROLLER_SETTINGS > 0
 #define controller_setting_list @NAME_setting_list
 
 typedef @NAME_settings controller_settings;
+
+static inline void controller_settings_default(controller_settings *settings)
+{
+    @NAME_settings_default(settings);
+}
 
 static inline void controller_settings_seal(controller_settings *settings)
 {
@@ -337,8 +346,6 @@ static inline int controller_retune(controller_state *loop, const controller_set
 {
     return @NAME_retune(loop, settings);
 }
-#else
-#define CONTROLLER_SETTINGS 0
 #endif
 
 #endif

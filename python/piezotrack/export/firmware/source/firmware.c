@@ -5,6 +5,9 @@
 #include "ring.h"
 
 static controller_state loop;
+#if CONTROLLER_SETTINGS > 0
+static controller_settings settings; /* in use: a start would take those of the design */
+#endif
 static struct firmware_status status = {MODE_OFF, FAULT_NONE, 0, 0, 0, 0, SAFE_VOLTS, 0, 0};
 static real volts_table[TABLE_SAMPLES];
 static real reference_table[TABLE_SAMPLES];
@@ -201,8 +204,10 @@ void firmware_init(void)
 #if CONTROLLER_SETTINGS > 0
     {
         controller_settings saved;
-        if (board_recall(&saved, (uint32_t)sizeof saved)) {
-            (void)controller_retune(&loop, &saved); /* refused where it is of another controller */
+        controller_settings_default(&settings);
+        /* refused where they are of another controller */
+        if (board_recall(&saved, (uint32_t)sizeof saved) && controller_retune(&loop, &saved)) {
+            settings = saved;
         }
     }
 #endif
@@ -309,6 +314,9 @@ static int run(uint32_t count, uint32_t periods, int played, real reference)
             return 0;
         }
         invalid_in_a_row = 0;
+#if CONTROLLER_SETTINGS > 0
+        (void)controller_retune(&loop, &settings);
+#endif
     }
     table_count = count;
     table_place = 0;
@@ -365,7 +373,7 @@ int firmware_settings(real *numbers)
 #if CONTROLLER_SETTINGS > 0
     uint32_t i;
     for (i = 0; i < CONTROLLER_SETTINGS; i++) {
-        numbers[i] = loop.settings.value[i];
+        numbers[i] = settings.value[i];
     }
     return 1;
 #else
@@ -386,6 +394,9 @@ int firmware_retune(const real *numbers)
     controller_settings_seal(&next);
     board_mask(1);
     done = controller_retune(&loop, &next);
+    if (done) {
+        settings = next;
+    }
     board_mask(0);
     return done;
 #else
@@ -397,7 +408,7 @@ int firmware_retune(const real *numbers)
 int firmware_save(void)
 {
 #if CONTROLLER_SETTINGS > 0
-    return board_store(&loop.settings, (uint32_t)sizeof loop.settings);
+    return board_store(&settings, (uint32_t)sizeof settings);
 #else
     return 0;
 #endif
