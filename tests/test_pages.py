@@ -153,8 +153,10 @@ def console(block: Block, where: str, served: contextlib.ExitStack) -> Iterator[
             subprocess.run([name, *arguments], check=True, capture_output=True)
         elif name.endswith("-host"):
             converters = ADDRESSES["converters://127.0.0.1"].rpartition(":")[2]
-            board = subprocess.Popen([f"./{name}", "0", converters], stdout=subprocess.PIPE, text=True)
-            served.enter_context(board)
+            command = [f"./{name}", "0", converters]
+            board = served.enter_context(
+                subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+            )
             served.callback(board.kill)
             assert board.stdout is not None
             ADDRESSES[f"firmware://127.0.0.1:{arguments[0]}"] = board.stdout.readline().strip()

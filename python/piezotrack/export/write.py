@@ -169,8 +169,8 @@ def export_controller(
     expect("reference", reference, (Reference, type(None)), "a Reference, as pt.sine(...)")
     single = _core.as_truth("single", single)
     fixed = _core.as_truth("fixed", fixed)
-    if fixed and to != "c99":
-        raise ParameterError("fixed", f"True with to={to!r}", "False, that is of to='c99'")
+    if fixed and to not in ("c99", "firmware"):
+        raise ParameterError("fixed", f"True with to={to!r}", "False, that is of C99 and firmware")
     names = export_files(to, name)
     played = feedforward_table(controller, reference, table)
     note = _clipped(controller, played or [])

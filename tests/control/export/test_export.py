@@ -311,7 +311,7 @@ NO_FORM: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "name inside": ({}, {"name": "pid"}, "name is 'pid', as functions inside"),
     "name of the harness": ({}, {"name": "check"}, "name is 'check', as a file or function beside"),
     "name of the library": ({}, {"name": "piezotrack"}, "name is 'piezotrack', as a file or"),
-    "form": ({}, {"to": "cobol"}, "to is 'cobol': expected 'c99', 'firmware', 'library', 'json' or 'fmu'"),
+    "form": ({}, {"to": "cobol"}, "to is 'cobol': expected 'c99', 'firmware', 'library'"),
     "float": (
         {"feedback": pt.control.StateSpace([[1e60]], [1.0], [1.0])},
         {"single": True},

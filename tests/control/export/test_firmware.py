@@ -147,6 +147,73 @@ def test_a_step_on_a_board_has_the_bits_and_the_instructions_that_are_stated(
             assert int(counts["mean"]) > 0.5 * done.instructions
 
 
+@needs_gcc
+@pytest.mark.parametrize("single", [False, True], ids=["double", "float"])
+def test_gains_change_while_it_runs_as_those_of_a_session(
+    single: bool, tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    """No bump, and to the bit in double those of `Session.retune`; a restart remembers them."""
+    one = controller(filters=[])
+    other = replace(one, feedback=pt.Pid.from_um(kp=0.03, ti=0.01))
+    kept = str(tmp_path / "kept")
+    with booted(one, tmp_path, "host", stage.address, kept, single=single) as (address, _):
+        device = connected(address)
+        device.follow(4e-5)
+        assert within(lambda: device.state().recorded > 300)
+        device.retune(other)
+        device.save_settings()
+        assert device.settings()["pid_proportional"] == pytest.approx(3e4, rel=1e-6)
+        assert within(lambda: device.state().recorded > 2000)
+        log = device.log()
+        device.close()
+    if log.u.size < 4000:
+        session, changed = one.start(), None
+        for k, (volts, reading) in enumerate(zip(log.u, log.recorded, strict=True)):
+            before = session.last.voltage
+            asked = session.step(4e-5, reading, feedforward=0.0)
+            if changed is None and abs(asked - volts) > (1e-4 if single else 0.0):
+                # The settings came between these samples.
+                changed = k
+                session = one.start()
+                for earlier in log.recorded[:k]:
+                    session.step(4e-5, earlier, feedforward=0.0)
+                session.retune(other)
+                assert session.last.voltage == before
+                asked = session.step(4e-5, reading, feedforward=0.0)
+            assert abs(asked - volts) <= (2e-4 if single else 0.0), k
+        assert changed is not None
+    with booted(one, tmp_path, "host", stage.address, kept) as (address, _):
+        device = connected(address)
+        assert device.settings()["pid_proportional"] == pytest.approx(3e4, rel=1e-6)
+        device.close()
+    # An image of another controller is refused: the design's numbers are there.
+    with (tmp_path / "kept").open("r+b") as file:
+        file.seek(4)
+        file.write(b"none")
+    with booted(one, tmp_path, "host", stage.address, kept) as (address, _):
+        device = connected(address)
+        assert device.settings()["pid_proportional"] == pytest.approx(2e4, rel=1e-6)
+        with pytest.raises(ParameterError, match="numbers"):
+            device.retune(controller())
+        assert device.settings()["pid_proportional"] == pytest.approx(2e4, rel=1e-6)
+        device.close()
+
+
+@needs_gcc
+def test_numbers_that_are_fixed_cannot_be_changed(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    one = controller(filters=[])
+    with booted(one, tmp_path, "host", stage.address, fixed=True) as (address, _):
+        device = connected(address)
+        assert device.settings() == {}
+        with pytest.raises(ParameterError, match="fixed"):
+            device.retune(one)
+        run = device.track(one, "sine:2Hz,10..60um,0.5s")
+        assert run.metrics.rms_error < 25e-6
+        device.close()
+
+
 class Clock:
     """Converters that send what a test says, and keep what is answered [V]."""
 
@@ -254,6 +321,12 @@ def test_lines_that_make_no_sense_are_answered(
                 "run 1 1 2": "error run",
                 "read 0 257": "error samples",
                 "clear": "error clear",
+                "stage": "ok",
+                "set 99 1": "error set",
+                "set 0": "error set",
+                "set 0 1e30": "ok",
+                "tune": "error tune",
+                "setting 99": "error setting",
                 "x" * 2000: "error line",
                 "ping ": "ok",
             }.items():

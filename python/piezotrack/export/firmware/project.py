@@ -191,9 +191,9 @@ def _vectors(rows: list[Row], sources: Sources, *, single: bool) -> str:
 
     lines = []
     for row in rows:
-        numbers = (row.reference, row.next, row.measured, row.feedforward, float(row.reset))
-        numbers = (*numbers, row.applied, row.command)
-        lines.append("    {" + ", ".join(map(entry, numbers)) + "},\n")
+        inputs = (row.reference, row.next, row.measured, row.feedforward, float(row.reset))
+        entries = map(entry, (*inputs, row.applied, row.command))
+        lines.append("    {" + ", ".join(entries) + "},\n")
     pieces = {
         "@count": str(len(rows)),
         "@bound": literal(sources.bound, "bound", single=single).partition(" ")[0],
