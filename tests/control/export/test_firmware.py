@@ -6,6 +6,7 @@ import math
 import re
 import socket
 import struct
+import subprocess
 import threading
 import time
 from dataclasses import replace
@@ -17,6 +18,7 @@ import pytest
 import piezotrack as pt
 from boards import BOARDS, MACHINES, booted, connected, made, needs_cross
 from c_exports import DAHL, loop, needs_gcc
+from folders import ROOT
 from piezotrack.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -145,6 +147,49 @@ def test_a_step_on_a_board_has_the_bits_and_the_instructions_that_are_stated(
         assert done.most_instructions / 20 < int(counts["worst"]) <= done.most_instructions
         if done.most_instructions == done.instructions:
             assert int(counts["mean"]) > 0.5 * done.instructions
+
+
+RUST = """
+#include <stdint.h>
+typedef double real;
+typedef struct { uint32_t nothing; } controller_state;
+int axis_begin(void);
+double axis_volts(double reference, double measured, double feedforward);
+void axis_gave(double volts);
+void axis_forget(void);
+#define controller_init(loop) ((void)(loop), (void)axis_begin())
+#define controller_step(loop, reference, next, reading, volts) axis_volts(reference, reading, volts)
+#define controller_applied(loop, volts) (axis_gave(volts), 1)
+#define controller_reset(loop) axis_forget()
+"""
+
+
+@needs_cross
+@pytest.mark.slow
+def test_the_rust_controller_gives_the_same_bits_on_a_board(tmp_path: Path) -> None:
+    target = "thumbv7em-none-eabihf"
+    crate = ROOT / "tests" / "no_std" / "Cargo.toml"
+    built = subprocess.run(
+        ["cargo", "build", "--locked", "--release", "--manifest-path", str(crate)]
+        + ["--target", target, "--target-dir", str(tmp_path / "rust")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if "target may not be installed" in built.stderr:
+        pytest.skip(f"no board is compiled for: {target} is not installed")
+    assert built.returncode == 0, built.stderr
+    library = tmp_path / "rust" / target / "release" / "libpiezotrack_no_std.a"
+    one = replace(loop("PID"), span=SPAN)
+    pt.control.export_controller(one, tmp_path, to="firmware", name="axis")
+    (tmp_path / "configuration.h").write_text(RUST)
+    makefile = (tmp_path / "Makefile").read_text()
+    makefile = makefile.replace(
+        "COUNT := count.c mps2_startup.c $(NAME).c", f"COUNT := count.c mps2_startup.c {library}"
+    )
+    (tmp_path / "Makefile").write_text(makefile)
+    printed = made(tmp_path, "count-m4")
+    assert "steps apart 0 of 2000" in printed
 
 
 @needs_gcc
