@@ -20,6 +20,7 @@ TABLE = """
 --bound           NAME=LOW:HIGH                             Bounds
 --checkpoint      FILE                                      to continue after an interruption
 --clip            -                                         Clip a drive
+--clock           FREQUENCY                                 Clock of the processor
 --constrain       'A < B'                                   Inequality of two parameters
 --controllers     NAMES                                     Controllers
 --creep           none|fit|TIME,...                         Creep
@@ -117,7 +118,7 @@ TABLE = """
 --ti              TIME                                      Integral time of the PID
 --tie             NAME=EXPRESSION                           Dependent parameter
 --time            COLUMN                                    Column of the time
---to              c99|library|json|fmu                      co-simulation unit
+--to              c99|firmware|library|json|fmu             co-simulation unit
 --tq              TIME                                      Filter time of the repetitive control
 --trials          N                                         Trials at most
 --tt              TIME                                      anti-windup

@@ -45,7 +45,7 @@ def declare(folder: Path, name: str) -> None:
 
 def test_a_device_of_another_package_is_connected_by_its_scheme(site: Path) -> None:
     declare(site, "lab")
-    assert schemes() == ["gcs", "ni", "scpi", "virtual", "lab"]
+    assert schemes() == ["firmware", "gcs", "ni", "scpi", "virtual", "lab"]
     device = pt.hardware.connect("lab://stage:7/x?limits=0..1V")
     assert vars(device)["called_with"] == ("stage", 7, "/x", {"limits": "0..1V"})
 

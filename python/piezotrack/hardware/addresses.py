@@ -40,7 +40,8 @@ def connect(address: str) -> Device:
         begin at 0; ``gcs://HOST[:PORT][/AXIS]``: a controller that speaks GCS, port 50000 and
         axis 1 where they are not given; ``?limits=0..100V``, ``factor=1V`` and ``timeout=5s`` as
         of `GcsDevice`; ``ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V`` as
-        `NiDevice`; ``scpi://HOST:PORT?unit=um&limits=0..75V`` as `ScpiDevice`.
+        `NiDevice`; ``scpi://HOST:PORT?unit=um&limits=0..75V`` as `ScpiDevice`;
+        ``firmware://HOST[:PORT]``, port 5555 where it is not given, as `FirmwareDevice`.
 
     Returns
     -------
