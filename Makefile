@@ -25,7 +25,7 @@ COUNTERS := -Cpasses=sancov-module $(addprefix -Cllvm-args=-sanitizer-coverage-,
 COVERAGE := target/coverage
 # A Cortex-M4F.
 EMBEDDED := thumbv7em-none-eabihf
-SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.html' -o -name '*.js' -o -name '*.svg' -o -name '*.gz' -o -name Cargo.toml | grep -v rust/capi) benches/Cargo.toml Cargo.toml Cargo.lock pyproject.toml
+SOURCES := $(shell find rust python/piezotrack -name '*.rs' -o -name '*.py' -o -name '*.pyi' -o -name '*.json' -o -name '*.css' -o -name '*.html' -o -name '*.js' -o -name '*.svg' -o -name '*.gz' -o -name '*.c' -o -name '*.h' -o -name Cargo.toml | grep -v rust/capi) benches/Cargo.toml Cargo.toml Cargo.lock pyproject.toml
 
 help: ## What can be typed
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/'

@@ -196,7 +196,9 @@ def settings_part(controller: Controller, parts: Sequence[Part], *, single: bool
     return Part(
         file="settings.c",
         chooses=("TUNED",),
-        text="\n".join([*lines, "", *_defaults(settings, single=single), "", *_list(settings, single)]),
+        text="\n".join(
+            [*lines, "", *_defaults(settings, single=single), "", *_list(settings, single=single)]
+        ),
     )
 
 
@@ -218,7 +220,7 @@ def _defaults(settings: Sequence[Setting], *, single: bool) -> list[str]:
     return [*lines, "};"]
 
 
-def _list(settings: Sequence[Setting], single: bool) -> list[str]:  # noqa: FBT001
+def _list(settings: Sequence[Setting], *, single: bool) -> list[str]:
     lines = ["const NAME_setting NAME_setting_list[NAME_SETTINGS] = {"]
     for setting in settings:
         low, high = (range_literal(one, single=single) for one in (setting.low, setting.high))
