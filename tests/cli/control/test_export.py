@@ -40,7 +40,7 @@ def test_the_c_of_a_file_is_that_of_the_controller() -> None:
     assert "exists: expected --overwrite" in refusal("export", "x-axis.json", "--out", "c")
     output = ran("export", "x-axis.json", "--out", "c", "--overwrite", "--float", "--json")
     document = json.loads(output)
-    assert document["state_bytes"] == 68
+    assert document["state_bytes"] == 96
     assert document["bound"] == pytest.approx(1.5e-3)
     assert Path("c/x_axis.c").read_bytes() != before
 
