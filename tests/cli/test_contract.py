@@ -45,6 +45,7 @@ TABLE = """
 --feedback        -                                         PID feedback
 --feedforward     -                                         Feedforward by the inverse of the model
 --fix             NAME=VALUE                                Known value
+--fixed           -                                         constants, not settings
 --float           -                                         Numbers of 4 bytes
 --format          png|svg|pdf                               Format of pictures
 --free            A,B,...                                   Parameters to identify

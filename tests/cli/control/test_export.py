@@ -33,14 +33,14 @@ def test_the_c_of_a_file_is_that_of_the_controller() -> None:
     save("x-axis.json")
     output = ran("export", "x-axis.json", "--out", "c")
     assert names("c") == ["check.c", "vectors.csv", "x_axis.c", "x_axis.h"]
-    assert "state 120 bytes; a step has 10 additions, 4 multiplications" in output
+    assert "state 168 bytes; a step has 10 additions, 4 multiplications" in output
     compiled(Path("c"), "check.c", "x_axis.c")
     assert checked(Path("c"))[0] == 0
     before = Path("c/x_axis.c").read_bytes()
     assert "exists: expected --overwrite" in refusal("export", "x-axis.json", "--out", "c")
     output = ran("export", "x-axis.json", "--out", "c", "--overwrite", "--float", "--json")
     document = json.loads(output)
-    assert document["state_bytes"] == 68
+    assert document["state_bytes"] == 96
     assert document["bound"] == pytest.approx(1.5e-3)
     assert Path("c/x_axis.c").read_bytes() != before
 

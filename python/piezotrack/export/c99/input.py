@@ -89,12 +89,15 @@ def filters(coefficients: Sequence[Sequence[float]]) -> Part:
     count = len(coefficients)
     flat = [number for one in coefficients for number in one]
     most = max(MOST, *(2.0 * abs(one) for one in flat))
+    names = tuple(
+        f"filter_{i}_{one}" for i in range(1, count + 1) for one in ("b0", "b1", "b2", "a1", "a2")
+    )
     text = "b0, b1, b2, a1, a2 of each filter, one after the other"
     return Part(
         file="filters.c",
         chooses=("FILTERED",),
         sizes=(Size("FILTER_COUNT", count, "filters"),),
-        settings=(Setting("FILTERS", flat, text, "1", -most, most),),
+        settings=(Setting("FILTERS", flat, text, "1", -most, most, names),),
         fields=(
             Field("real", "filter_memory", "two numbers of each filter, m", 2 * count),
             Field("flag", "filter_begun", "whether it had a measurement", count),

@@ -69,6 +69,7 @@ def dahl_inverse(
     return Part(
         file="feedforward/dahl_inverse.c",
         chooses=("FORWARD_ONLINE", "DAHL_OPERATOR", *(["DELAYED"] if delayed else [])),
+        sizes=(Size("INVERSE_MOST_PIECES", int(MOST_PIECES) + 1, "pieces of the longest way"),),
         constants=tuple(constants),
         fields=(
             Field("inverse", "inverse", "state of the inverse"),

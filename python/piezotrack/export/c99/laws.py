@@ -19,6 +19,8 @@ __all__ = [
     "damping",
     "disturbance_observer",
     "pid",
+    "rows",
+    "share",
     "sliding_mode",
     "state_space",
 ]
@@ -37,7 +39,7 @@ class Scale(NamedTuple):
     unit : str
         Unit of the drive.
     most : float
-        The largest gain: the whole range of the limits for a millionth of the span.
+        The largest gain: the whole range of the limits for 1 nm.
     range : float
         Range of the limits.
     """
@@ -63,11 +65,25 @@ def signed(name: str, value: float, comment: str, unit: str) -> Setting:
     return Setting(name, value, comment, unit, *ends)
 
 
-def free(name: str, value: float | Sequence[float], comment: str, unit: str = "1") -> Setting:
+def free(
+    name: str,
+    value: float | Sequence[float],
+    comment: str,
+    unit: str = "1",
+    entries: tuple[str, ...] = (),
+) -> Setting:
     """Make numbers of any sign."""
     every = [value] if isinstance(value, (int, float)) else value
     most = WIDE * (max(abs(one) for one in every) or 1.0)
-    return Setting(name, value, comment, unit, -most, most)
+    return Setting(name, value, comment, unit, -most, most, entries)
+
+
+def rows(name: str, count: int, columns: int = 0) -> tuple[str, ...]:
+    """Name the entries of a vector, or of a matrix row by row, from 1 on."""
+    places = range(1, count + 1)
+    if not columns:
+        return tuple(f"{name}_{i}" for i in places)
+    return tuple(f"{name}_{i}_{k}" for i in places for k in range(1, columns + 1))
 
 
 def coefficient(name: str, value: float, comment: str, most: float) -> Setting:
@@ -105,13 +121,14 @@ def state_space(numbers: Numbers, scale: Scale) -> Part:
     back = "back" in numbers
     unit = scale.unit
     settings = [
-        free("LAW_A", numbers["a"], "A, row by row"),
-        free("LAW_B", numbers["b"], "B"),
-        free("LAW_C", numbers["c"], "C"),
+        free("LAW_A", numbers["a"], "A, row by row", entries=rows("law_a", n, n)),
+        free("LAW_B", numbers["b"], "B", entries=rows("law_b", n)),
+        free("LAW_C", numbers["c"], "C", entries=rows("law_c", n)),
         scale.gain("LAW_D", numbers["d"][0], "D"),
     ]
     if back:
-        settings.append(free("LAW_BACK", numbers["back"], "l, of the antiwindup"))
+        names = rows("law_back", n)
+        settings.append(free("LAW_BACK", numbers["back"], "l, of the antiwindup", entries=names))
     return Part(
         file="laws/state_space.c",
         chooses=("LAW_ANY", "LAW_SPACE", *(["BACK"] if back else [])),

@@ -49,8 +49,8 @@ WRITTEN = frozenset(
 )
 # The coefficients of a law that has a form in C: of itself, or of the law inside.
 FIRST = {"pid", "b", "sliding-mode"}
-# A gain that takes the command through its range for this share of the span is the largest.
-FINEST = 2.0**-20
+# The largest gain takes the command through its range for this error [m].
+FINEST = 1e-9
 # Longest table: its text has 50 bytes a sample.
 MOST_SAMPLES = 1_000_000
 
@@ -58,11 +58,11 @@ MOST_SAMPLES = 1_000_000
 def coefficients_of(controller: Controller) -> Numbers:
     """Return the numbers of every part as it is sampled, by name; of the filters a list."""
     numbers_of: Numbers = {"filters": []}
-    for name, numbers in controller._core.coefficients():
+    for name, values in controller._core.coefficients():
         if name == "filter":
-            numbers_of["filters"].append(numbers)
+            numbers_of["filters"].append(values)
         else:
-            numbers_of[name] = numbers
+            numbers_of[name] = values
     return numbers_of
 
 
@@ -274,8 +274,8 @@ def gains_of(controller: Controller) -> list[Part]:
         The law has no form in C.
     """
     found, unit = coefficients_of(controller), _unit(controller)
-    (low, high), (bottom, top) = controller.limits, found["span"]
-    scale = Scale(unit, (high - low) / (FINEST * (top - bottom)), high - low)
+    low, high = controller.limits
+    scale = Scale(unit, (high - low) / FINEST, high - low)
     parts = [filters(found["filters"])] if found["filters"] else []
     if _law_of(controller):
         parts += _laws(found, scale)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .laws import share
+from .laws import rows, share
 from .text import Constant, Field, Operations, Part, Setting, Size
 
 if TYPE_CHECKING:
@@ -24,13 +24,14 @@ def repetitive(numbers: Mapping[str, Sequence[float]], unit: str) -> Part:
     lead, _, entries, unread, whole = (int(one) for one in numbers["repetitive lengths"])
     taps = numbers["taps"]
     most = max(MOST_TAP, *(2.0 * abs(one) for one in taps))
+    count = len(taps)
+    names = rows("repetitive_tap", count)
     weights = "weights of the samples of a period ago, oldest first"
     settings = (
         share("REPETITIVE_POLE", pole, "p, of the filter Q"),
         Setting("REPETITIVE_GAIN", gain, "Kq", f"{unit}/m", 0.0, max(MOST_GAIN, gain)),
-        Setting("REPETITIVE_TAPS", taps, weights, "1", -most, most),
+        Setting("REPETITIVE_TAPS", taps, weights, "1", -most, most, names),
     )
-    count = len(taps)
     sizes = [
         Size("REPETITIVE_ENTRIES", entries, "entries of a delay line"),
         Size("REPETITIVE_UNREAD", unread, "oldest entries that no tap reads"),

@@ -197,7 +197,7 @@ def settings_part(controller: Controller, parts: Sequence[Part], *, single: bool
         file="settings.c",
         chooses=("TUNED",),
         text="\n".join(
-            [*lines, "", *_defaults(settings, single=single), "", *_list(settings, single)]
+            [*lines, "", *_defaults(settings, single=single), "", *_list(settings, single=single)]
         ),
     )
 
@@ -220,7 +220,7 @@ def _defaults(settings: Sequence[Setting], *, single: bool) -> list[str]:
     return [*lines, "};"]
 
 
-def _list(settings: Sequence[Setting], single: bool) -> list[str]:
+def _list(settings: Sequence[Setting], *, single: bool) -> list[str]:
     lines = ["const NAME_setting NAME_setting_list[NAME_SETTINGS] = {"]
     for setting in settings:
         low, high = (range_literal(one, single=single) for one in (setting.low, setting.high))

@@ -37,8 +37,8 @@ __all__ = ["Sources", "c_sources", "checked_name"]
 # With these the static functions of the C file begin.
 INSIDE = (
     *("pid", "law", "sliding", "observer", "hysteresis", "repetitive", "line", "table"),
-    *("inverse", "online", "readings", "filters", "is", "not", "numbers", "dahl", "feedback"),
-    *("damping", "settings", "square", "remember"),
+    *("inverse", "online", "readings", "filters", "is", "not", "damping"),
+    "feedback",
 )
 # Files and functions of these names are there beside those of the controller.
 BESIDE = ("check", "main", "piezotrack")

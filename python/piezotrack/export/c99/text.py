@@ -91,6 +91,8 @@ class Setting(NamedTuple):
         Its unit; 1 for none.
     low, high : float
         Range of each of the numbers.
+    entries : tuple of str
+        Names of the numbers of an array; empty for a single one.
     """
 
     name: str
@@ -99,20 +101,19 @@ class Setting(NamedTuple):
     unit: str
     low: float
     high: float
+    entries: tuple[str, ...] = ()
 
     @property
     def numbers(self) -> list[float]:
         """The numbers, one for a single one."""
-        alone = isinstance(self.value, (int, float))
-        return [float(one) for one in ([self.value] if alone else self.value)]  # type: ignore[union-attr]
+        if isinstance(self.value, (int, float)):
+            return [float(self.value)]
+        return [float(one) for one in self.value]
 
     @property
     def names(self) -> list[str]:
         """A name for each of the numbers, as an operator sees it."""
-        name = self.name.lower()
-        if isinstance(self.value, (int, float)):
-            return [name]
-        return [f"{name}_{i}" for i in range(len(self.value))]
+        return list(self.entries) if self.entries else [self.name.lower()]
 
     @property
     def constant(self) -> Constant:

@@ -12,6 +12,7 @@ static bool inverse_travel(NAME_inverse *at, real distance)
 {
     const real direction = (distance < (real)0) ? (real)-1 : (real)1;
     real left = magnitude(distance);
+    uint32_t i;
     if (!(left > INVERSE_PIECE)) {
         inverse_along(at, direction, distance);
         return true;
@@ -19,7 +20,10 @@ static bool inverse_travel(NAME_inverse *at, real distance)
     if (left > INVERSE_LONGEST) {
         return false;
     }
-    while (left > INVERSE_PIECE) {
+    for (i = 0u; i < INVERSE_MOST_PIECES; i++) {
+        if (!(left > INVERSE_PIECE)) {
+            break;
+        }
         inverse_along(at, direction, direction * INVERSE_PIECE);
         left -= INVERSE_PIECE;
     }

@@ -15,16 +15,18 @@ static real square_root(real x)
 {
     union { real value; pattern bits; } number;
     const pattern one = 1u;
+    pattern field;
     pattern mantissa;
     pattern root = 0u;
-    pattern rest = 0u;
+    pattern left = 0u;
     int32_t exponent;
     uint32_t i;
     if (!(x > (real)0) || !is_finite(x)) {
         return (x < (real)0) ? ((real)0 / (x - x)) : x;
     }
     number.value = x;
-    exponent = (int32_t)(number.bits >> STORED);
+    field = number.bits >> STORED;
+    exponent = (int32_t)field;
     mantissa = number.bits & ((one << STORED) - one);
     if (exponent == 0) {
         exponent = 1;
@@ -40,24 +42,28 @@ static real square_root(real x)
         exponent -= 1;
     }
     for (i = 0u; i < (STORED + 2u); i++) {
+        const uint32_t taken = 2u * i;
         pattern pair = 0u;
         pattern next;
-        if ((2u * i) <= STORED) {
-            pair = (mantissa >> (STORED - 2u * i)) & 3u;
-        } else if ((2u * i) == (STORED + 1u)) {
+        if (taken <= STORED) {
+            const uint32_t shift = STORED - taken;
+            pair = (mantissa >> shift) & 3u;
+        } else if (taken == (STORED + 1u)) {
             pair = (mantissa << 1u) & 3u;
         } else {
             /* there are no more digits */
         }
-        rest = (rest << 2u) | pair;
+        left = (left << 2u) | pair;
         next = 2u * root;
         root = next;
-        if (rest >= (2u * next + one)) {
-            rest -= 2u * next + one;
+        if (left >= ((2u * next) + one)) {
+            left -= (2u * next) + one;
             root = next + one;
         }
     }
     root = (root >> 1u) + (root & one);
-    number.bits = ((pattern)(exponent / 2 + BIAS) << STORED) + (root - (one << STORED));
+    exponent = (exponent / 2) + BIAS;
+    field = (pattern)exponent;
+    number.bits = (field << STORED) + (root - (one << STORED));
     return number.value;
 }

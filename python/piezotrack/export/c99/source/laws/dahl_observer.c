@@ -34,11 +34,13 @@ static void observer_follow(NAME_state *s, real place)
     const real direction = (way < (real)0) ? (real)-1 : (real)1;
     real left = magnitude(way);
     uint32_t i;
-    for (i = 0u; (i < 16u) && (left > (real)0); i++) {
-        const real piece = (left < OBSERVER_PIECE) ? left : OBSERVER_PIECE;
-        dahl_along(&numbers, &s->hysteresis_force, &s->hysteresis_slope, direction,
-                   direction * piece);
-        left -= piece;
+    for (i = 0u; i < 16u; i++) {
+        if (left > (real)0) {
+            const real piece = (left < OBSERVER_PIECE) ? left : OBSERVER_PIECE;
+            dahl_along(&numbers, &s->hysteresis_force, &s->hysteresis_slope, direction,
+                       direction * piece);
+            left -= piece;
+        }
     }
     s->observer_place = place;
 }
