@@ -220,6 +220,8 @@ CONFIGURATION = """\
 #ifndef CONFIGURATION_H
 #define CONFIGURATION_H
 
+#include <stdbool.h>
+
 #include "@NAME.h"
 
 typedef @NAME_real real;
@@ -295,9 +297,9 @@ static inline void controller_init(controller_state *loop)
     @NAME_init(loop);
 }
 
-static inline int controller_start(controller_state *loop, real present)
+static inline bool controller_start(controller_state *loop, real present)
 {
-    return @NAME_start(loop, present);
+    return @NAME_start(loop, present) != 0;
 }
 
 static inline real controller_step(
@@ -306,9 +308,9 @@ static inline real controller_step(
 @call
 }
 
-static inline int controller_applied(controller_state *loop, real volts)
+static inline bool controller_applied(controller_state *loop, real volts)
 {
-    return @NAME_applied(loop, volts);
+    return @NAME_applied(loop, volts) != 0;
 }
 
 static inline void controller_reset(controller_state *loop)
@@ -316,14 +318,14 @@ static inline void controller_reset(controller_state *loop)
     @NAME_reset(loop);
 }
 
-static inline int controller_saturated(const controller_state *loop)
+static inline bool controller_saturated(const controller_state *loop)
 {
-    return loop->last.saturated;
+    return loop->last.saturated != 0u;
 }
 
-static inline int controller_reading_ok(const controller_state *loop)
+static inline bool controller_reading_ok(const controller_state *loop)
 {
-    return loop->last.measurement_ok;
+    return loop->last.measurement_ok != 0u;
 }
 
 #define CONTROLLER_SETTINGS @CAPITALS_SETTINGS
@@ -342,9 +344,9 @@ static inline void controller_settings_seal(controller_settings *settings)
     @NAME_settings_seal(settings);
 }
 
-static inline int controller_retune(controller_state *loop, const controller_settings *settings)
+static inline bool controller_retune(controller_state *loop, const controller_settings *settings)
 {
-    return @NAME_retune(loop, settings);
+    return @NAME_retune(loop, settings) != 0;
 }
 #endif
 

@@ -5,13 +5,14 @@
 #ifndef BOARD_H
 #define BOARD_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* What the converters say of a sample. */
 #define BOARD_OVERRUN 1u /* the sample before was not answered in its interval */
 #define BOARD_INVALID 2u /* there is no reading */
 
-/* Starts clocks, converters, link and watchdog, with samples held back as by board_mask(1). Once
+/* Starts clocks, converters, link and watchdog, with samples held back as by board_mask(true). Once
    they are let come, the board calls firmware_sample in each sampling interval, by interrupt or
    within board_get. */
 void board_init(void);
@@ -28,17 +29,17 @@ int board_get(void);
 /* Sends a byte over the link; waits until there is room for it. */
 void board_put(char byte);
 
-/* 0 where the link is known to be lost. A serial line does not know, and returns 1. */
-int board_linked(void);
+/* False where the link is known to be lost. A serial line does not know, and returns true. */
+bool board_linked(void);
 
 /* Keeps the watchdog from a reset. */
 void board_feed(void);
 
-/* Holds firmware_sample back (1) or lets it come again (0). */
-void board_mask(int held);
+/* Holds firmware_sample back, or lets it come again. */
+void board_mask(bool held);
 
-/* Keeps a block of bytes over a reset, or reads it back; 0 where that cannot be done. */
-int board_store(const void *image, uint32_t bytes);
-int board_recall(void *image, uint32_t bytes);
+/* Keeps a block of bytes over a reset, or reads it back; false where that cannot be done. */
+bool board_store(const void *image, uint32_t bytes);
+bool board_recall(void *image, uint32_t bytes);
 
 #endif

@@ -18,7 +18,7 @@ static uint32_t table_place; /* sample that comes next */
 static uint32_t table_divider;
 static uint32_t table_wait; /* intervals until the next sample */
 static uint32_t table_periods; /* periods left; 0: without an end */
-static int table_played; /* whether the voltages are the feedforward of the loop */
+static bool table_played; /* whether the voltages are the feedforward of the loop */
 static real constant; /* reference without a table, m */
 
 static uint32_t overruns_in_a_row;
@@ -28,18 +28,18 @@ static volatile uint8_t sampled; /* a sample came since firmware_poll looked */
 
 static real not_a_number(void)
 {
-    const real zero = 0;
+    const real zero = (real)0;
     return zero / zero;
 }
 
-static int is_finite(real value)
+static bool is_finite(real value)
 {
-    return value - value <= 0;
+    return (value - value) <= (real)0;
 }
 
-static int is_allowed(real volts)
+static bool is_allowed(real volts)
 {
-    return volts >= LIMITS_LOW && volts <= LIMITS_HIGH;
+    return (volts >= LIMITS_LOW) && (volts <= LIMITS_HIGH);
 }
 
 /* Puts a voltage out: within the limits, and within the codes of the DAC. */
@@ -48,21 +48,25 @@ static void put_out(real volts)
     real code;
     real kept = volts;
     if (!(kept >= LIMITS_LOW)) {
-        kept = kept < LIMITS_LOW ? LIMITS_LOW : SAFE_VOLTS;
+        kept = (kept < LIMITS_LOW) ? LIMITS_LOW : SAFE_VOLTS;
     } else if (kept > LIMITS_HIGH) {
         kept = LIMITS_HIGH;
+    } else {
+        /* it is within */
     }
     code = (kept - DAC_ZERO_VOLTS) * DAC_CODES_PER_VOLT + (real)0.5;
-    if (!(code >= 0)) {
-        code = 0;
+    if (!(code >= (real)0)) {
+        code = (real)0;
     } else if (code > DAC_CODE_MOST) {
         code = DAC_CODE_MOST;
+    } else {
+        /* it is one */
     }
     status.volts = kept;
     board_write((uint32_t)code);
 }
 
-static int is_moving(void)
+static bool is_moving(void)
 {
     return status.mode == MODE_HOLD || status.mode == MODE_PLAY || status.mode == MODE_RUN;
 }
@@ -78,7 +82,7 @@ static void fail(enum firmware_fault fault)
 }
 
 /* A step of the way to the safe voltage; 1 where it is reached. */
-static int step_down(real *volts)
+static bool step_down(real *volts)
 {
     const real way = SAFE_VOLTS - *volts;
     if (way > SAFE_STEP) {
@@ -87,9 +91,9 @@ static int step_down(real *volts)
         *volts -= SAFE_STEP;
     } else {
         *volts = SAFE_VOLTS;
-        return 1;
+        return true;
     }
-    return 0;
+    return false;
 }
 
 /* The voltage of the table for this interval. */
@@ -111,14 +115,14 @@ static real play(void)
 static real follow(real reading, real *reference)
 {
     real next = constant;
-    real forward = 0;
+    real forward = (real)0;
     *reference = constant;
     if (table_count > 0u) {
         const uint32_t after = table_place + 1u < table_count ? table_place + 1u : 0u;
-        const int stays = table_periods == 1u && after == 0u;
+        const bool stays = table_periods == 1u && after == 0u;
         *reference = reference_table[table_place];
         next = reference_table[stays ? table_place : after];
-        forward = table_played ? volts_table[table_place] : 0;
+        forward = table_played ? volts_table[table_place] : (real)0;
         if (!stays) {
             if (after == 0u && table_periods > 1u) {
                 table_periods--;
@@ -132,12 +136,12 @@ static real follow(real reading, real *reference)
 
 void firmware_sample(uint32_t code, unsigned from_converters)
 {
-    const int invalid = (from_converters & BOARD_INVALID) != 0u;
-    const int overrun = (from_converters & BOARD_OVERRUN) != 0u;
+    const bool invalid = (from_converters & BOARD_INVALID) != 0u;
+    const bool overrun = (from_converters & BOARD_OVERRUN) != 0u;
     struct ring_sample sample;
     real volts = status.volts;
     real reference = not_a_number();
-    int records = 1;
+    bool records = true;
     status.tick++;
     status.reading = invalid ? not_a_number() : ADC_ZERO_METRES + (real)code * ADC_METRES_PER_CODE;
     sample.flags = (invalid ? SAMPLE_INVALID : 0u) | (overrun ? SAMPLE_OVERRUN : 0u);
@@ -159,7 +163,7 @@ void firmware_sample(uint32_t code, unsigned from_converters)
         break;
     case MODE_PLAY:
         if (table_place == 0u && table_wait > table_divider) {
-            records = 0; /* the first voltage, before the record */
+            records = false; /* the first voltage, before the record */
         } else {
             records = table_wait == table_divider;
             status.left = table_count - table_place - 1u;
@@ -212,7 +216,7 @@ void firmware_init(void)
     }
 #endif
     put_out(SAFE_VOLTS);
-    ring_begin(0);
+    ring_begin(0u);
     last_sample = board_millis();
 }
 
@@ -220,7 +224,7 @@ void firmware_poll(void)
 {
     const uint32_t now = board_millis();
     const uint32_t since_line = protocol_poll(now);
-    board_mask(1);
+    board_mask(true);
     if (sampled != 0u) {
         sampled = 0;
         last_sample = now;
@@ -233,64 +237,64 @@ void firmware_poll(void)
             put_out(SAFE_VOLTS); /* no sample would lead it there */
         }
     }
-    board_mask(0);
+    board_mask(false);
     board_feed();
 }
 
 void firmware_status(struct firmware_status *there)
 {
-    board_mask(1);
+    board_mask(true);
     *there = status;
-    board_mask(0);
+    board_mask(false);
 }
 
 /* From here on: what the protocol asks for. All of it is held back from the samples. */
 
-int firmware_hold(real volts)
+bool firmware_hold(real volts)
 {
     if (!is_allowed(volts) || status.mode == MODE_FAULT) {
-        return 0;
+        return false;
     }
-    board_mask(1);
+    board_mask(true);
     status.mode = MODE_HOLD;
     status.left = 0;
-    ring_begin(0);
+    ring_begin(0u);
     put_out(volts);
-    board_mask(0);
-    return 1;
+    board_mask(false);
+    return true;
 }
 
-int firmware_load(unsigned table, uint32_t first, const real *numbers, uint32_t count)
+bool firmware_load(unsigned table, uint32_t first, const real *numbers, uint32_t count)
 {
     uint32_t i;
     if (first > TABLE_SAMPLES || count > TABLE_SAMPLES - first || status.mode == MODE_PLAY) {
-        return 0;
+        return false;
     }
     for (i = 0; i < count; i++) {
         const real number = numbers[i];
         if (table == TABLE_VOLTS ? !is_allowed(number) : !is_finite(number)) {
-            return 0;
+            return false;
         }
     }
     for (i = 0; i < count; i++) {
-        board_mask(1);
+        board_mask(true);
         if (table == TABLE_VOLTS) {
             volts_table[first + i] = numbers[i];
         } else {
             reference_table[first + i] = numbers[i];
         }
-        board_mask(0);
+        board_mask(false);
     }
-    return 1;
+    return true;
 }
 
-int firmware_play(uint32_t count, uint32_t divider, uint32_t lead)
+bool firmware_play(uint32_t count, uint32_t divider, uint32_t lead)
 {
     if (count == 0u || count > TABLE_SAMPLES || divider == 0u || divider > DIVIDER_MOST
         || lead > UINT32_MAX - divider || status.mode == MODE_FAULT) {
-        return 0;
+        return false;
     }
-    board_mask(1);
+    board_mask(true);
     table_count = count;
     table_place = 0;
     table_divider = divider;
@@ -298,20 +302,20 @@ int firmware_play(uint32_t count, uint32_t divider, uint32_t lead)
     status.left = count;
     status.mode = MODE_PLAY;
     ring_begin(count);
-    board_mask(0);
-    return 1;
+    board_mask(false);
+    return true;
 }
 
-static int run(uint32_t count, uint32_t periods, int played, real reference)
+static bool run(uint32_t count, uint32_t periods, bool played, real reference)
 {
     if (status.mode == MODE_FAULT) {
-        return 0;
+        return false;
     }
-    board_mask(1);
+    board_mask(true);
     if (status.mode != MODE_RUN) {
         if (!controller_start(&loop, status.volts)) {
-            board_mask(0);
-            return 0;
+            board_mask(false);
+            return false;
         }
         invalid_in_a_row = 0;
 #if CONTROLLER_SETTINGS > 0
@@ -326,90 +330,90 @@ static int run(uint32_t count, uint32_t periods, int played, real reference)
     status.left = count == 0u || periods > UINT32_MAX / count ? 0u : count * periods;
     status.mode = MODE_RUN;
     ring_begin(status.left);
-    board_mask(0);
-    return 1;
+    board_mask(false);
+    return true;
 }
 
-int firmware_run(uint32_t count, uint32_t periods, int played)
+bool firmware_run(uint32_t count, uint32_t periods, bool played)
 {
-    if (count == 0u || count > TABLE_SAMPLES || (played && !CONTROLLER_TAKES_VOLTS)) {
-        return 0;
+    if (count == 0u || count > TABLE_SAMPLES || (played && (CONTROLLER_TAKES_VOLTS == 0))) {
+        return false;
     }
-    return run(count, periods, played, 0);
+    return run(count, periods, played, (real)0);
 }
 
-int firmware_follow(real reference)
+bool firmware_follow(real reference)
 {
-    return is_finite(reference) ? run(0, 0, 0, reference) : 0;
+    return is_finite(reference) && run(0u, 0u, false, reference);
 }
 
-int firmware_stop(void)
+bool firmware_stop(void)
 {
-    board_mask(1);
+    board_mask(true);
     if (is_moving()) {
         ring_end();
         status.left = 0;
         status.mode = MODE_RAMP;
     }
-    board_mask(0);
-    return 1;
+    board_mask(false);
+    return true;
 }
 
-int firmware_clear(void)
+bool firmware_clear(void)
 {
-    int done = 0;
-    board_mask(1);
+    bool done = false;
+    board_mask(true);
     if (status.mode == MODE_FAULT && !(status.volts < SAFE_VOLTS || status.volts > SAFE_VOLTS)) {
         status.mode = MODE_OFF;
         status.fault = FAULT_NONE;
-        done = 1;
+        done = true;
     }
-    board_mask(0);
+    board_mask(false);
     return done;
 }
 
-int firmware_settings(real *numbers)
+bool firmware_settings(real *numbers)
 {
 #if CONTROLLER_SETTINGS > 0
     uint32_t i;
-    for (i = 0; i < CONTROLLER_SETTINGS; i++) {
+    for (i = 0; i < (uint32_t)CONTROLLER_SETTINGS; i++) {
         numbers[i] = settings.value[i];
     }
-    return 1;
+    return true;
 #else
     (void)numbers;
-    return 0;
+    return false;
 #endif
 }
 
-int firmware_retune(const real *numbers)
+bool firmware_retune(const real *numbers)
 {
 #if CONTROLLER_SETTINGS > 0
     controller_settings next;
     uint32_t i;
-    int done;
-    for (i = 0; i < CONTROLLER_SETTINGS; i++) {
+    bool done;
+    for (i = 0; i < (uint32_t)CONTROLLER_SETTINGS; i++) {
         next.value[i] = numbers[i];
     }
     controller_settings_seal(&next);
-    board_mask(1);
+    board_mask(true);
     done = controller_retune(&loop, &next);
     if (done) {
         settings = next;
     }
-    board_mask(0);
+    board_mask(false);
     return done;
 #else
     (void)numbers;
-    return 0;
+    return false;
 #endif
 }
 
-int firmware_save(void)
+bool firmware_save(void)
 {
 #if CONTROLLER_SETTINGS > 0
     return board_store(&settings, (uint32_t)sizeof settings);
 #else
-    return 0;
+    return false;
 #endif
 }

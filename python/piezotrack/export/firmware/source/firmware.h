@@ -5,6 +5,7 @@
 #ifndef FIRMWARE_H
 #define FIRMWARE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "configuration.h"
@@ -49,18 +50,18 @@ void firmware_sample(uint32_t code, unsigned status);
 /* Answers the link and watches over it: called by main again and again. */
 void firmware_poll(void);
 
-/* What the protocol asks for: each returns 0, and changes nothing, where it cannot be. */
+/* What the protocol asks for: each returns false, and changes nothing, where it cannot be. */
 void firmware_status(struct firmware_status *status);
-int firmware_hold(real volts);
-int firmware_load(unsigned table, uint32_t first, const real *numbers, uint32_t count);
-int firmware_play(uint32_t count, uint32_t divider, uint32_t lead);
-int firmware_run(uint32_t count, uint32_t periods, int played);
-int firmware_follow(real reference);
-int firmware_stop(void);
-int firmware_clear(void);
-int firmware_settings(real *numbers);
-int firmware_retune(const real *numbers);
-int firmware_save(void);
+bool firmware_hold(real volts);
+bool firmware_load(unsigned table, uint32_t first, const real *numbers, uint32_t count);
+bool firmware_play(uint32_t count, uint32_t divider, uint32_t lead);
+bool firmware_run(uint32_t count, uint32_t periods, bool played);
+bool firmware_follow(real reference);
+bool firmware_stop(void);
+bool firmware_clear(void);
+bool firmware_settings(real *numbers);
+bool firmware_retune(const real *numbers);
+bool firmware_save(void);
 
 /* Tables of firmware_load. */
 #define TABLE_VOLTS 0u

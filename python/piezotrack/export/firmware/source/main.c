@@ -5,7 +5,7 @@ int main(void)
 {
     board_init();
     firmware_init();
-    board_mask(0);
+    board_mask(false);
     for (;;) {
         firmware_poll();
     }

@@ -23,7 +23,7 @@ static real staged[CONTROLLER_SETTINGS];
 static const char *const modes[] = {"off", "ramp", "hold", "play", "run", "fault"};
 static const char *const faults[FAULT_COUNT] = {"none", "overrun", "reading", "link", "sampling"};
 
-static void say(int done, const char *problem)
+static void say(bool done, const char *problem)
 {
     if (done) {
         text_put("ok");
@@ -88,14 +88,14 @@ static void load(char *rest)
     static real numbers[NUMBERS];
     const char *name = text_word(&rest);
     const unsigned table = text_same(name, "reference") ? TABLE_REFERENCE : TABLE_VOLTS;
-    uint32_t first;
+    uint32_t first = 0;
     uint32_t count = 0;
     if (table == TABLE_VOLTS && !text_same(name, "voltage")) {
-        say(0, "table: expected voltage or reference");
+        say(false, "table: expected voltage or reference");
         return;
     }
     if (!text_count(text_word(&rest), &first)) {
-        say(0, "place: expected a whole number");
+        say(false, "place: expected a whole number");
         return;
     }
     for (;;) {
@@ -104,7 +104,7 @@ static void load(char *rest)
             break;
         }
         if (count == NUMBERS || !text_number(word, &numbers[count])) {
-            say(0, "number: expected up to 48 decimals or bits");
+            say(false, "number: expected up to 48 decimals or bits");
             return;
         }
         count++;
@@ -116,20 +116,20 @@ static void load(char *rest)
 static void read_samples(char *rest)
 {
     struct ring_sample sample;
-    uint32_t first;
-    uint32_t count;
+    uint32_t first = 0;
+    uint32_t count = 0;
     uint32_t i;
     if (!text_count(text_word(&rest), &first) || !text_count(text_word(&rest), &count)
         || count > READ_MOST) {
-        say(0, "samples: expected the first one and up to 256");
+        say(false, "samples: expected the first one and up to 256");
         return;
     }
     text_put("ok");
     for (i = 0; i < count; i++) {
-        int there;
-        board_mask(1);
+        bool there;
+        board_mask(true);
         there = ring_get(first + i, &sample);
-        board_mask(0);
+        board_mask(false);
         if (!there) {
             break;
         }
@@ -143,10 +143,10 @@ static void read_samples(char *rest)
 
 static void play_table(char *rest)
 {
-    uint32_t count;
-    uint32_t divider;
-    uint32_t lead;
-    const int read = text_count(text_word(&rest), &count)
+    uint32_t count = 0;
+    uint32_t divider = 0;
+    uint32_t lead = 0;
+    const bool read = text_count(text_word(&rest), &count)
         && text_count(text_word(&rest), &divider) && text_count(text_word(&rest), &lead);
     say(read && firmware_play(count, divider, lead),
         "play: expected samples, intervals of a sample, intervals before; no fault");
@@ -154,10 +154,10 @@ static void play_table(char *rest)
 
 static void run_table(char *rest)
 {
-    uint32_t count;
-    uint32_t periods;
-    uint32_t played;
-    const int read = text_count(text_word(&rest), &count)
+    uint32_t count = 0;
+    uint32_t periods = 0;
+    uint32_t played = 0;
+    const bool read = text_count(text_word(&rest), &count)
         && text_count(text_word(&rest), &periods) && text_count(text_word(&rest), &played);
     say(read && played <= 1u && firmware_run(count, periods, played == 1u),
         "run: expected samples, periods, whether voltages are added; no fault");
@@ -166,10 +166,10 @@ static void run_table(char *rest)
 #if CONTROLLER_SETTINGS > 0
 static void show_setting(char *rest)
 {
-    uint32_t place;
+    uint32_t place = 0;
     real numbers[CONTROLLER_SETTINGS];
-    if (!text_count(text_word(&rest), &place) || place >= CONTROLLER_SETTINGS) {
-        say(0, "setting: expected its place, from 0");
+    if (!text_count(text_word(&rest), &place) || place >= (uint32_t)CONTROLLER_SETTINGS) {
+        say(false, "setting: expected its place, from 0");
         return;
     }
     (void)firmware_settings(numbers);
@@ -186,19 +186,19 @@ static void show_setting(char *rest)
 
 static void stage_setting(char *rest)
 {
-    uint32_t place;
+    uint32_t place = 0;
     real number;
-    if (!text_count(text_word(&rest), &place) || place >= CONTROLLER_SETTINGS
+    if (!text_count(text_word(&rest), &place) || place >= (uint32_t)CONTROLLER_SETTINGS
         || !text_number(text_word(&rest), &number)) {
-        say(0, "set: expected a place, from 0, and a number");
+        say(false, "set: expected a place, from 0, and a number");
         return;
     }
     staged[place] = number;
-    say(1, "");
+    say(true, "");
 }
 
-/* Commands of the settings; 0 where it is none. */
-static int answer_settings(const char *verb, char *rest)
+/* Commands of the settings; false where it is none. */
+static bool answer_settings(const char *verb, char *rest)
 {
     if (text_same(verb, "setting")) {
         show_setting(rest);
@@ -211,20 +211,20 @@ static int answer_settings(const char *verb, char *rest)
     } else if (text_same(verb, "save")) {
         say(firmware_save(), "save: the board keeps nothing");
     } else {
-        return 0;
+        return false;
     }
-    return 1;
+    return true;
 }
 #else
-static int answer_settings(const char *verb, char *rest)
+static bool answer_settings(const char *verb, char *rest)
 {
     (void)verb;
     (void)rest;
-    return 0;
+    return false;
 }
 #endif
 
-static void one_number(char *rest, int (*does)(real number), const char *problem)
+static void one_number(char *rest, bool (*does)(real number), const char *problem)
 {
     real number;
     say(text_number(text_word(&rest), &number) && does(number), problem);
@@ -235,7 +235,7 @@ static void exchange(char *rest)
     struct firmware_status now;
     real volts;
     if (!text_number(text_word(&rest), &volts) || !firmware_hold(volts)) {
-        say(0, "exchange: expected a voltage within the limits; no fault");
+        say(false, "exchange: expected a voltage within the limits; no fault");
         return;
     }
     firmware_status(&now);
@@ -246,7 +246,7 @@ static void answer(char *rest)
 {
     const char *verb = text_word(&rest);
     if (text_same(verb, "ping")) {
-        say(1, "");
+        say(true, "");
     } else if (text_same(verb, "id")) {
         identify();
     } else if (text_same(verb, "state")) {
@@ -270,7 +270,7 @@ static void answer(char *rest)
     } else if (text_same(verb, "read")) {
         read_samples(rest);
     } else if (!answer_settings(verb, rest)) {
-        say(0, "command: expected ping, id, state, hold, exchange, load, play, run, follow, stop, "
+        say(false, "command: expected ping, id, state, hold, exchange, load, play, run, follow, stop, "
                "clear, read, setting, stage, set, tune or save");
     }
     board_put('\n');

@@ -22,7 +22,7 @@ void ring_add(const struct ring_sample *sample)
     if (recording != 0u) {
         samples[recorded % RING_SAMPLES] = *sample;
         recorded++;
-        if (recorded == wanted || recorded == UINT32_MAX) {
+        if ((recorded == wanted) || (recorded == UINT32_MAX)) {
             recording = 0;
         }
     }
@@ -33,12 +33,12 @@ uint32_t ring_count(void)
     return recorded;
 }
 
-int ring_get(uint32_t number, struct ring_sample *sample)
+bool ring_get(uint32_t number, struct ring_sample *sample)
 {
     const uint32_t there = recorded;
-    if (number >= there || there - number > RING_SAMPLES) {
-        return 0;
+    if ((number >= there) || ((there - number) > RING_SAMPLES)) {
+        return false;
     }
     *sample = samples[number % RING_SAMPLES];
-    return 1;
+    return true;
 }

@@ -4,6 +4,7 @@
 #ifndef RING_H
 #define RING_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "configuration.h"
@@ -33,7 +34,7 @@ void ring_add(const struct ring_sample *sample);
 /* Samples recorded so far, of which the last RING_SAMPLES are there. */
 uint32_t ring_count(void);
 
-/* The sample of this number, from 0; 0 where it is not there, or not any more. */
-int ring_get(uint32_t number, struct ring_sample *sample);
+/* The sample of this number, from 0; false where it is not there, or not any more. */
+bool ring_get(uint32_t number, struct ring_sample *sample);
 
 #endif

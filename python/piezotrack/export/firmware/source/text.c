@@ -56,25 +56,25 @@ void text_put_decimal(real number)
     uint32_t whole;
     uint32_t place = 100000u;
     int exponent = 0;
-    if (!(number - number <= 0)) {
+    if (!((number - number) <= (real)0)) {
         text_put("nan");
         return;
     }
-    if (number < 0) {
+    if (number < (real)0) {
         board_put('-');
         number = -number;
     }
-    if (number > 0) {
-        while (number >= 10) {
-            number /= 10;
+    if (number > (real)0) {
+        while (number >= (real)10) {
+            number /= (real)10;
             exponent++;
         }
-        while (number < 1) {
-            number *= 10;
+        while (number < (real)1) {
+            number *= (real)10;
             exponent--;
         }
     }
-    whole = (uint32_t)(number * 100000 + (real)0.5);
+    whole = (uint32_t)(number * (real)100000 + (real)0.5);
     if (whole >= 1000000u) {
         whole /= 10u;
         exponent++;
@@ -111,7 +111,7 @@ char *text_word(char **line)
     return begin;
 }
 
-int text_same(const char *one, const char *other)
+bool text_same(const char *one, const char *other)
 {
     while (*one != '\0' && *one == *other) {
         one++;
@@ -120,24 +120,24 @@ int text_same(const char *one, const char *other)
     return *one == *other;
 }
 
-int text_count(const char *word, uint32_t *count)
+bool text_count(const char *word, uint32_t *count)
 {
     uint32_t value = 0;
     if (*word == '\0') {
-        return 0;
+        return false;
     }
     for (; *word != '\0'; word++) {
         const uint32_t digit = (uint32_t)(unsigned char)*word - (uint32_t)'0';
         if (digit > 9u || value > (UINT32_MAX - digit) / 10u) {
-            return 0;
+            return false;
         }
         value = 10u * value + digit;
     }
     *count = value;
-    return 1;
+    return true;
 }
 
-static int hexadecimal(const char *word, real *number)
+static bool hexadecimal(const char *word, real *number)
 {
     union pattern pattern;
     int n;
@@ -150,10 +150,10 @@ static int hexadecimal(const char *word, real *number)
         } else if (c >= 'a' && c <= 'f') {
             digit = (bits)(c - 'a') + 10u;
         } else {
-            return 0;
+            return false;
         }
         if (n == DIGITS) {
-            return 0;
+            return false;
         }
         pattern.bits = (pattern.bits << 4) | digit;
     }
@@ -161,28 +161,28 @@ static int hexadecimal(const char *word, real *number)
     return n == DIGITS;
 }
 
-int text_number(const char *word, real *number)
+bool text_number(const char *word, real *number)
 {
-    real value = 0;
-    real sign = 1;
+    real value = (real)0;
+    real sign = (real)1;
     int digits = 0;
     int exponent = 0;
     int power = 0;
-    int below = 0;
-    int down = 0;
+    bool below = false;
+    bool down = false;
     if (*word == 'x') {
         return hexadecimal(word + 1, number);
     }
     if (*word == '-' || *word == '+') {
-        sign = *word == '-' ? -1 : 1;
+        sign = (*word == '-') ? (real)-1 : (real)1;
         word++;
     }
-    for (; (*word >= '0' && *word <= '9') || (*word == '.' && below == 0); word++) {
+    for (; (*word >= '0' && *word <= '9') || (*word == '.' && !below); word++) {
         if (*word == '.') {
-            below = 1;
+            below = true;
         } else {
-            value = 10 * value + (real)(*word - '0');
-            exponent -= below;
+            value = (real)10 * value + (real)(*word - '0');
+            exponent -= below ? 1 : 0;
             digits++;
         }
     }
@@ -193,25 +193,25 @@ int text_number(const char *word, real *number)
             word++;
         }
         if (*word == '\0') {
-            return 0;
+            return false;
         }
         for (; *word >= '0' && *word <= '9' && power < EXPONENT_MOST; word++) {
             power = 10 * power + (*word - '0');
         }
     }
     if (digits == 0 || digits >= 40 || *word != '\0') {
-        return 0;
+        return false;
     }
     exponent += down ? -power : power;
     for (; exponent > 0; exponent--) {
-        value *= 10;
+        value *= (real)10;
     }
     for (; exponent < 0; exponent++) {
-        value /= 10;
+        value /= (real)10;
     }
-    if (!(value - value <= 0)) {
-        return 0;
+    if (!((value - value) <= (real)0)) {
+        return false;
     }
     *number = sign * value;
-    return 1;
+    return true;
 }

@@ -5,6 +5,7 @@
 #ifndef TEXT_H
 #define TEXT_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "configuration.h"
@@ -18,10 +19,10 @@ void text_put_decimal(real number);
 /* The next word of a line, ended by a 0 in its place; empty at the end. */
 char *text_word(char **line);
 
-int text_same(const char *one, const char *other);
+bool text_same(const char *one, const char *other);
 
-/* Reads a whole number or a number; 0 where the word is none. */
-int text_count(const char *word, uint32_t *count);
-int text_number(const char *word, real *number);
+/* Reads a whole number or a number; false where the word is none. */
+bool text_count(const char *word, uint32_t *count);
+bool text_number(const char *word, real *number);
 
 #endif

@@ -33,8 +33,8 @@ static int count_of_arguments;
 static int listener = -1;
 static int client = -1;
 static int converters = -1;
-static int held = 1;
-static int answers; /* whether a sample waits for its answer */
+static bool held = true;
+static bool answers; /* whether a sample waits for its answer */
 
 static unsigned char frame[FRAME];
 static int frame_bytes;
@@ -166,9 +166,9 @@ static void take_sample(void)
         const uint32_t code = (uint32_t)frame[0] | ((uint32_t)frame[1] << 8)
             | ((uint32_t)frame[2] << 16) | ((uint32_t)frame[3] << 24);
         frame_bytes = 0;
-        answers = 1;
+        answers = true;
         firmware_sample(code, frame[4]);
-        answers = 0;
+        answers = false;
     }
 }
 
@@ -215,7 +215,7 @@ void board_put(char byte)
     output_bytes++;
 }
 
-int board_linked(void)
+bool board_linked(void)
 {
     return client >= 0;
 }
@@ -225,29 +225,29 @@ void board_feed(void)
     flush_output();
 }
 
-void board_mask(int now)
+void board_mask(bool now)
 {
     held = now; /* between samples, which come within board_get alone */
 }
 
-int board_store(const void *image, uint32_t bytes)
+bool board_store(const void *image, uint32_t bytes)
 {
     FILE *file;
-    int done;
+    bool done;
     if (count_of_arguments < 4) {
-        return 0;
+        return false;
     }
     file = fopen(arguments[3], "wb");
     done = file != NULL && fwrite(image, bytes, 1, file) == 1;
     return file != NULL && fclose(file) == 0 && done;
 }
 
-int board_recall(void *image, uint32_t bytes)
+bool board_recall(void *image, uint32_t bytes)
 {
     FILE *file = count_of_arguments < 4 ? NULL : fopen(arguments[3], "rb");
-    int done;
+    bool done;
     if (file == NULL) {
-        return 0;
+        return false;
     }
     done = fread(image, bytes, 1, file) == 1;
     (void)fclose(file);
@@ -264,7 +264,7 @@ int main(int count, char **given)
     count_of_arguments = count;
     board_init();
     firmware_init();
-    board_mask(0);
+    board_mask(false);
     for (;;) {
         firmware_poll();
     }

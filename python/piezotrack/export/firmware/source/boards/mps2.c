@@ -42,7 +42,7 @@ struct uart {
 static volatile uint32_t millis;
 static uint8_t frame[FRAME];
 static uint32_t frame_bytes;
-static uint8_t answers;
+static bool answers;
 
 void systick_handler(void);
 void converters_handler(void);
@@ -70,9 +70,9 @@ void converters_handler(void)
             const uint32_t code = (uint32_t)frame[0] | ((uint32_t)frame[1] << 8)
                 | ((uint32_t)frame[2] << 16) | ((uint32_t)frame[3] << 24);
             frame_bytes = 0;
-            answers = 1;
+            answers = true;
             firmware_sample(code, frame[4]);
-            answers = 0;
+            answers = false;
         }
     }
 }
@@ -109,7 +109,7 @@ void board_init(void)
 void board_write(uint32_t code)
 {
     uint32_t i;
-    for (i = 0; i < ANSWER && answers != 0u; i++) {
+    for (i = 0; i < ANSWER && answers; i++) {
         send(CONVERTERS, code >> (8u * i));
     }
 }
@@ -129,9 +129,9 @@ void board_put(char byte)
     send(LINK, (uint32_t)(unsigned char)byte);
 }
 
-int board_linked(void)
+bool board_linked(void)
 {
-    return 1;
+    return true;
 }
 
 void board_feed(void)
@@ -139,7 +139,7 @@ void board_feed(void)
     WATCHDOG_CLEAR = 1u;
 }
 
-void board_mask(int held)
+void board_mask(bool held)
 {
     if (held) {
         INTERRUPT_DISABLE = 1u << CONVERTERS_INTERRUPT;
@@ -149,16 +149,16 @@ void board_mask(int held)
     }
 }
 
-int board_store(const void *image, uint32_t bytes)
+bool board_store(const void *image, uint32_t bytes)
 {
     (void)image;
     (void)bytes;
-    return 0; /* it has no memory that outlives a reset */
+    return false; /* it has no memory that outlives a reset */
 }
 
-int board_recall(void *image, uint32_t bytes)
+bool board_recall(void *image, uint32_t bytes)
 {
     (void)image;
     (void)bytes;
-    return 0;
+    return false;
 }
