@@ -18,16 +18,36 @@ if TYPE_CHECKING:
     from ..control.controller.controller import Controller
     from ..references.reference import Reference
 
-__all__ = ["HEADER", "STEPS", "Row", "reach_of", "rows_of", "vectors_text"]
+__all__ = ["HEADER", "STEPS", "Lag", "Row", "range_of", "rows_of", "stage_of", "vectors_text"]
 
 STEPS = 2000
 # A longer period is gone through twice, up to this many steps.
 MOST_STEPS = 20_000
+# Share of the way that the stage goes in a sample.
+FRESH = 0.3
 HEADER = (
     "step,reference_m,next_m,measured_m,feedforward_{unit},reset_before,applied_{unit},"
     "command_{unit},unclipped_{unit},feedback_{unit},repetitive_{unit},error_m,"
     "saturated,measurement_ok,reference_ok"
 )
+
+
+class Lag(NamedTuple):
+    """The stage of the vectors: a lag without hysteresis, over the range of the limits.
+
+    Around an observer it is the plant that the observer knows.
+
+    Attributes
+    ----------
+    bottom, gain : float
+        Displacement at the lower limit [m], and its rise with the drive [m/V].
+    fresh : float
+        Share of the way that is gone in a sample.
+    """
+
+    bottom: float
+    gain: float
+    fresh: float
 
 
 class Row(NamedTuple):
@@ -87,11 +107,11 @@ def rows_of(
         2000, or more where two periods are longer.
     """
     steps = _steps(controller, table)
-    bottom, top = reach_of(controller)
+    bottom, top = _reach(controller)
     low, high = controller.limits
-    gain = (top - bottom) / (high - low)
+    begin, gain, fresh = stage_of(controller)
     motion = _motion(controller, steps, bottom, top, reference)
-    session, rows, x = controller.start(), [], bottom + gain * (0.0 - low)
+    session, rows, x = controller.start(), [], begin + gain * (0.0 - low)
     online = controller.feedforward is not None and table is None
     for k in range(steps):
         reset = k == steps * 4 // 5
@@ -114,7 +134,7 @@ def rows_of(
             session.applied(applied)
         there = out if math.isnan(applied) else applied
         if low <= there <= high:
-            x += 0.3 * (bottom + gain * (there - low) - x)
+            x += fresh * (begin + gain * (there - low) - x)
         rows.append(
             Row(
                 desired, ahead, measured, math.nan if online else given, reset, applied,
@@ -125,14 +145,46 @@ def rows_of(
     return rows
 
 
+def stage_of(controller: Controller) -> Lag:
+    """Return the stage of the vectors."""
+    bottom, top = _reach(controller)
+    low, high = controller.limits
+    if (plant := _plant(controller)) is None:
+        return Lag(bottom, (top - bottom) / (high - low), FRESH)
+    gain, fresh = plant
+    return Lag(bottom if gain > 0.0 else top, gain, fresh)
+
+
+def _plant(controller: Controller) -> tuple[float, float] | None:
+    """Gain [m/V] and share of the way in a sample of the plant that an observer knows."""
+    numbers = dict(controller._core.coefficients())
+    if "disturbance-observer" in numbers:
+        _, pole, inverse = numbers["disturbance-observer"]
+        rise = 1.0 / inverse
+    elif "dahl-observer" in numbers:
+        pole, rise, *_ = numbers["dahl-observer"]
+    else:
+        return None
+    return rise / (1.0 - pole), (1.0 - pole if pole > 0.0 else FRESH)
+
+
 def _steps(controller: Controller, table: Sequence[float] | None) -> int:
     period = 0.0 if controller.repetitive is None else controller.repetitive.period / controller.dt
     longest = max(period, 0.0 if table is None else len(table))
     return min(max(STEPS, math.ceil(2.5 * longest)), MOST_STEPS)
 
 
-def reach_of(controller: Controller) -> tuple[float, float]:
-    """Return the displacements between which the test moves [m]."""
+def _reach(controller: Controller) -> tuple[float, float]:
+    """Displacements between which the test moves [m]."""
+    bottom, top = range_of(controller)
+    if (plant := _plant(controller)) is not None:
+        low, high = controller.limits
+        top = min(top, bottom + abs(plant[0]) * (high - low))
+    return bottom, top
+
+
+def range_of(controller: Controller) -> tuple[float, float]:
+    """Return the displacements that the stage can have [m]."""
     low, high = controller._valid
     if controller.feedforward is None:
         if controller.span is None:

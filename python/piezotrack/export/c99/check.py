@@ -2,14 +2,40 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from .tree import choices_of, joined
 
-__all__ = ["check_code"]
+__all__ = ["Loop", "check_code"]
 
 FORWARD = {"given": (), "table": ("FORWARD_TABLE",), "online": ("FORWARD_ONLINE",)}
 
 
-def check_code(forward: str, bound: float, flags: int, link: str = "") -> str:
+CLOSED_TEXT = """\
+ * The loop is closed around the stage of the vectors, a lag: an observer around an integral would
+ * add up twice what floats leave out, where no reading answers."""
+
+
+class Loop(NamedTuple):
+    """The loop around the stage of the vectors.
+
+    Attributes
+    ----------
+    gain, fresh : float
+        Rise of the stage with the drive [m/V], and share of the way that is gone in a sample.
+    low, high : float
+        Limits of the drive.
+    """
+
+    gain: float
+    fresh: float
+    low: float
+    high: float
+
+
+def check_code(
+    forward: str, bound: float, flags: int, link: str = "", closed: Loop | None = None
+) -> str:
     """Write the program.
 
     Parameters
@@ -22,6 +48,8 @@ def check_code(forward: str, bound: float, flags: int, link: str = "") -> str:
         Flags that may differ.
     link : str, optional
         What the compiler is told besides, after a space.
+    closed : Loop, optional
+        Closes the loop in place of a replay of the readings.
 
     Returns
     -------
@@ -32,5 +60,15 @@ def check_code(forward: str, bound: float, flags: int, link: str = "") -> str:
         f"#define BOUND {bound!r} /* largest difference allowed; 0: all bits are the same */\n"
         f"#define FLAGS {flags} /* flags that may differ */\n"
     )
-    code = joined("check.c", choices_of(FORWARD[forward]), {"bounds.h": bounds})
+    chosen = FORWARD[forward]
+    if closed is not None:
+        chosen = *chosen, "CLOSED"
+        bounds += (
+            f"#define STAGE_GAIN {closed.gain!r} /* of the lag, m for one unit of the drive */\n"
+            f"#define STAGE_FRESH {closed.fresh!r} /* share of the way gone in a sample */\n"
+            f"#define STAGE_LOW {closed.low!r} /* lowest drive that it gets */\n"
+            f"#define STAGE_HIGH {closed.high!r} /* highest one */\n"
+        )
+    code = joined("check.c", choices_of(chosen), {"bounds.h": bounds})
+    code = code.replace("@closed\n", "" if closed is None else f"{CLOSED_TEXT}\n")
     return code.replace("@flags", str(flags)).replace("@link", link)

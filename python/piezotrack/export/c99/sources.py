@@ -7,11 +7,13 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ... import _core
 from ..._support.arguments import expect
 from ...errors import ParameterError
-from ..vectors import STEPS, rows_of, vectors_text
-from .check import check_code
+from ..vectors import STEPS, rows_of, stage_of, vectors_text
+from .check import Loop, check_code
 from .parts import parts_of, shape_of
 from .settings import places_of, settings_part
 from .text import (
@@ -28,8 +30,12 @@ from .text import (
 from .tree import choices_of, choices_text, joined
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ...control.controller.controller import Controller
     from ...references.reference import Reference
+    from ..vectors import Row
+    from .loop import Shape
     from .text import Part
 
 __all__ = ["Sources", "c_sources", "checked_name"]
@@ -43,9 +49,11 @@ INSIDE = (
 # Files and functions of these names are there beside those of the controller.
 BESIDE = ("check", "main", "piezotrack")
 # A float has 24 bits, and an integral adds up what they leave out: the largest difference in 2000
-# steps, as a share of the limits' range. In a replay, where no reading answers, an observer around
-# an integral adds it up twice.
-FLOAT_BOUND, FLOAT_BOUND_OBSERVER = 2e-5, 0.1
+# steps, as a share of the limits' range.
+FLOAT_BOUND = 2e-5
+FLOAT_ROUNDING = 2.0**-24
+# In a replay, where no reading answers, an observer around an integral would add it up twice: these
+# are checked in a closed loop.
 OBSERVERS = ("disturbance-observer", "perturbation-estimator", "hysteresis-observer")
 # Share of the steps whose flags may differ: where the unclipped command is at the limit.
 FLOAT_FLAGS = 0.01
@@ -157,10 +165,7 @@ def c_sources(
     operations = sum((one.operations for one in parts), Operations())
     unit = controller.drive_unit
     rows = rows_of(controller, table, reference)
-    bound, flags = _bounds(controller, shape.law, len(rows)) if single else (0.0, 0)
-    if single and shape.forward == "online":
-        finite = (abs(row.reference) for row in rows if math.isfinite(row.reference))
-        bound += _bound_of_differences(parts, max(finite))
+    bound, flags = _bounds(controller, shape, parts, rows) if single else (0.0, 0)
     choices = choices_of(name for one in parts for name in one.chooses)
     given = {
         part.file: _numbers_text(part, places, single=single, tuned=tuned) for part in parts
@@ -176,7 +181,11 @@ def c_sources(
     texts = {f"{name}.{end}": joined(f"NAME.{end}", choices, given) for end in ("h", "c")}
     for key, piece in pieces.items():
         texts = {file: text.replace(key, piece) for file, text in texts.items()}
-    texts["check.c"] = check_code(shape.forward, bound, flags)
+    closed = None
+    if single and shape.law in OBSERVERS:
+        stage = stage_of(controller)
+        closed = Loop(stage.gain, stage.fresh, *controller.limits)
+    texts["check.c"] = check_code(shape.forward, bound, flags, closed=closed)
     files = {file: named_in(name, text) for file, text in texts.items()}
     files["vectors.csv"] = vectors_text(rows, unit)
     return Sources(
@@ -194,22 +203,72 @@ def c_sources(
     )
 
 
-def _bounds(controller: Controller, law: str, steps: int) -> tuple[float, int]:
+def _bounds(
+    controller: Controller, shape: Shape, parts: tuple[Part, ...], rows: Sequence[Row]
+) -> tuple[float, int]:
     """Largest difference of a float, in the unit of the drive, and how many flags may differ."""
     low, high = controller.limits
-    share = FLOAT_BOUND_OBSERVER if law in OBSERVERS else FLOAT_BOUND
-    return share * (high - low) * steps / STEPS, int(FLOAT_FLAGS * steps)
+    steps = len(rows)
+    bound = FLOAT_BOUND * (high - low) * steps / STEPS
+    reach = max(abs(row.reference) for row in rows if math.isfinite(row.reference))
+    rounding = reach * FLOAT_ROUNDING
+    if shape.forward == "online":
+        bound += _bound_of_differences(parts, rows, rounding, reach)
+    if shape.law in OBSERVERS:
+        bound += _bound_of_estimate(parts, rounding)
+    return bound, int(FLOAT_FLAGS * steps)
 
 
-def _bound_of_differences(parts: tuple[Part, ...], reach: float) -> float:
-    """Largest effect of a rounded reference on the online inverse, in the unit of the drive."""
+def _bound_of_differences(
+    parts: tuple[Part, ...], rows: Sequence[Row], rounding: float, reach: float
+) -> float:
+    """Largest effect of a rounded reference on the online inverse, in the unit of the drive.
+
+    The inverse is told x, v and a of differences, each ahead by the delay: what the reference is
+    off by counts 2/Ts times in v, 4/Ts^2 times in a. The hysteresis rises with its slope along x;
+    dry friction has the sign of v, which may be the other one where v is near 0.
+    """
     constants = (one for part in parts for one in part.constants)
     of = {one.name: one.value for one in constants if isinstance(one.value, float)}
-    rounding = reach * 2.0**-24
-    velocity = 2.0 * rounding / of["REFERENCE_DT"]
-    acceleration = 4.0 * rounding / of["REFERENCE_DT_SQUARED"]
-    drive = of["INVERSE_STIFFNESS"] * rounding + of["INVERSE_DAMPING"] * velocity
-    return drive + of["INVERSE_INERTIA"] * acceleration
+    dt, delay = of["REFERENCE_DT"], of.get("REFERENCE_DELAY", 0.0)
+    a = 4.0 * rounding / of["REFERENCE_DT_SQUARED"]
+    v = 2.0 * rounding / dt + delay * a
+    x = rounding + delay * (2.0 * rounding / dt + 0.5 * delay * a)
+    # The branch from rest gets no steeper than its curvature times the way on which it bends.
+    ways = [abs(of["INVERSE_A1"]), math.sqrt(abs(of["INVERSE_A2"]))]
+    slope = abs(of["INVERSE_GAIN"]) * min([reach, *(1.0 / one for one in ways if one > 0.0)])
+    drive = abs(of["INVERSE_STIFFNESS"]) * x + abs(of["INVERSE_DAMPING"]) * v
+    drive += abs(of["INVERSE_INERTIA"]) * a + 2.0 * abs(of["INVERSE_LEVEL"]) * slope * x
+    if min(_speeds(rows, dt, delay), default=math.inf) <= v:
+        drive += 2.0 * abs(of["INVERSE_FRICTION"]) * slope
+    return drive
+
+
+def _speeds(rows: Sequence[Row], dt: float, delay: float) -> list[float]:
+    """Magnitudes of the velocities that the inverse is told [m/s], without those that are 0."""
+    places = np.array([row.reference for row in rows])
+    ahead = np.array([row.next for row in rows])[1:]
+    before, now = places[:-1], places[1:]
+    past = np.concatenate([before[:1], before[:-1]])
+    known = np.isfinite(ahead)
+    v = np.where(known, 0.5 * (ahead - before), now - before) / dt
+    a = np.where(known, ahead - 2.0 * now + before, now - 2.0 * before + past) / dt**2
+    speeds = np.abs(v + delay * a)
+    return [float(one) for one in speeds[np.isfinite(speeds) & (speeds > 0.0)]]
+
+
+def _bound_of_estimate(parts: tuple[Part, ...], rounding: float) -> float:
+    """Largest effect of a rounded reading on what an observer estimates, in a closed loop.
+
+    It divides a difference of two readings by the rise of its plant in a sample, and its estimate
+    takes a share of that.
+    """
+    of = {one.name: one.numbers[0] for part in parts for one in part.settings}
+    if "OBSERVER_INVERSE" in of:
+        inverse, share = of["OBSERVER_INVERSE"], of["OBSERVER_FRESH"]
+    else:
+        inverse, share = 1.0 / of["OBSERVER_FRESH"], of["OBSERVER_CORRECTION"]
+    return 4.0 * abs(inverse) * share * rounding
 
 
 def _command_bytes(*, single: bool) -> int:

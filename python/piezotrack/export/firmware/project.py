@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...errors import ParameterError
 from ..c99.parts import shape_of
-from ..c99.sources import Sources, c_sources
+from ..c99.sources import OBSERVERS, Sources, c_sources
 from ..c99.text import literal
-from ..vectors import reach_of, rows_of
+from ..vectors import range_of, rows_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -108,7 +108,10 @@ def firmware_project(
     rows = rows_of(inside)[:VECTORS]
     texts = {path: text for path, text in sources.files.items() if path.startswith(f"{name}.")}
     texts["configuration.h"] = _configuration(inside, sources, span, single=single)
-    texts["vectors.h"] = _vectors(rows, sources, single=single)
+    law = inside.feedback
+    # Of these a float is not compared where no reading answers: check.c closes the loop for them.
+    compared = not (single and law is not None and law.info.name in OBSERVERS)
+    texts["vectors.h"] = _vectors(rows, sources, single=single, compared=compared)
     for path, text in _sources(SOURCE):
         texts[path] = text.replace("@NAME", name)
     return Project(texts, sources)
@@ -147,7 +150,7 @@ def _sensor_span(controller: Controller) -> tuple[float, float]:
             "span=(LOW, HIGH), the displacements at both ends of the ADC",
             verb="has",
         )
-    bottom, top = reach_of(controller)
+    bottom, top = range_of(controller)
     more = MARGIN * (top - bottom)
     return bottom - more, top + more
 
@@ -181,7 +184,7 @@ def _configuration(
     return text.replace("@CAPITALS", sources.name.upper()).replace("@NAME", sources.name)
 
 
-def _vectors(rows: list[Row], sources: Sources, *, single: bool) -> str:
+def _vectors(rows: list[Row], sources: Sources, *, single: bool, compared: bool) -> str:
     """Write inputs and commands of the controller itself, for a board that counts and compares."""
 
     def entry(value: float) -> str:
@@ -197,6 +200,7 @@ def _vectors(rows: list[Row], sources: Sources, *, single: bool) -> str:
     pieces = {
         "@count": str(len(rows)),
         "@bound": literal(sources.bound, "bound", single=single).partition(" ")[0],
+        "@apart": f"{0 if compared else len(rows)}u",
         "@rows": "".join(lines),
     }
     text = VECTORS_TEXT
@@ -361,7 +365,7 @@ VECTORS_TEXT = """\
 
 #define VECTORS @countu
 #define VECTORS_BOUND @bound
-#define VECTORS_APART 0u
+#define VECTORS_APART @apart
 #define NOT_FINITE ((real)(0.0f / 0.0f))
 #define INFINITE ((real)(1.0f / 0.0f))
 

@@ -1,6 +1,7 @@
 /*
  * Runs vectors.csv through NAME_step and prints the largest difference to what the controller of
  * piezotrack gives. Returns 0 where all are within the bound and at most @flags flags differ.
+@closed
  *
  *     cc -std=c99 -O2 -ffp-contract=off -o check check.c NAME.c@link && ./check vectors.csv
  */
@@ -15,6 +16,17 @@
 #define COLUMNS 15
 
 static NAME_state state;
+#if CLOSED
+
+/* How far the stage is from where it is in the vectors, m. */
+static double away;
+
+/* The lag of the vectors, after a command (or what was reported of it) that is another. */
+static void move(double more)
+{
+    away += STAGE_FRESH * (STAGE_GAIN * more - away);
+}
+#endif
 
 static double difference(double found, double expected)
 {
@@ -61,6 +73,9 @@ int main(int count, char **arguments)
         if (in[5] > 0) {
             NAME_reset(&state);
         }
+#if CLOSED
+        in[3] += away;
+#endif
 #if FORWARD_ONLINE
         NAME_step(&state, (NAME_real)in[1], (NAME_real)in[2], (NAME_real)in[3]);
 #elif FORWARD_TABLE
@@ -83,6 +98,13 @@ int main(int count, char **arguments)
         if (in[6] == in[6]) {
             NAME_applied(&state, (NAME_real)in[6]);
         }
+#if CLOSED
+        if (!(in[6] == in[6])) {
+            move((double)state.last.volts - in[7]);
+        } else if (in[6] >= STAGE_LOW && in[6] <= STAGE_HIGH) {
+            move(0);
+        }
+#endif
         steps++;
     }
     fclose(file);
