@@ -9,7 +9,7 @@ from .. import _core
 from ..control.laws.neural_network import NETWORK, NetworkInverse
 from .c99.check import check_code
 from .c99.sources import checked_name
-from .c99.text import array_lines, literal, named_in
+from .c99.text import array_lines, comment_of, literal, named_in
 from .vectors import rows_of, vectors_text
 
 if TYPE_CHECKING:
@@ -56,14 +56,10 @@ def library_sources(
     checked_name(name)
     forward = "given" if controller.feedforward is None else "online"
     forward = forward if table is None else "table"
-    facts = "\n".join(
-        f" * {line}"
-        for line in (
-            repr(controller),
-            f"Written by piezotrack {_core.__version__}, piezotrack export --to library; do not "
-            "edit.",
-        )
-    ).replace("*/", "* /")
+    written = (
+        f"Written by piezotrack {_core.__version__}, piezotrack export --to library; do not edit."
+    )
+    facts = "\n".join(f" * {comment_of(line)}" for line in (repr(controller), written))
     pieces = {
         "@facts": facts,
         "@unit": controller.drive_unit,

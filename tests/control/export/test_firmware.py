@@ -170,8 +170,10 @@ def test_the_rust_controller_gives_the_same_bits_on_a_board(tmp_path: Path) -> N
     target = "thumbv7em-none-eabihf"
     crate = ROOT / "tests" / "no_std" / "Cargo.toml"
     built = subprocess.run(
-        ["cargo", "build", "--locked", "--release", "--manifest-path", str(crate)]
-        + ["--target", target, "--target-dir", str(tmp_path / "rust")],
+        [
+            *("cargo", "build", "--locked", "--release", "--manifest-path", str(crate)),
+            *("--target", target, "--target-dir", str(tmp_path / "rust")),
+        ],
         capture_output=True,
         text=True,
         check=False,
