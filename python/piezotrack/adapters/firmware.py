@@ -353,15 +353,15 @@ class FirmwareDevice:
                 "controller", "given", "none: the firmware was exported with fixed numbers"
             )
         values = settings_of(controller, single=self.board.real == 4)
-        if len(values) != self.board.settings:
+        if (names := tuple(self.settings())) != tuple(values):
             raise ParameterError(
                 "controller",
-                f"{len(values)} numbers",
-                f"{self.board.settings}, those of the firmware",
+                f"{', '.join(values)} as numbers",
+                f"{', '.join(names)}, those of the firmware",
                 verb="has",
             )
         self._ask("stage")
-        for place, value in enumerate(values):
+        for place, value in enumerate(values.values()):
             self._ask(f"set {place} {self._bits(value)}")
         self._ask("tune")
 

@@ -137,7 +137,7 @@ def replayed(name: str) -> tuple[str, list[list[float]]]:
 
     def retuned(to: pt.Controller) -> None:
         session.retune(to)
-        numbers = settings_of(to, like=first)
+        numbers = list(settings_of(to, like=first).values())
         lines.append(" ".join(["3", *(number.hex() for number in numbers)]))
 
     retuned(others[0])
@@ -252,7 +252,7 @@ def test_what_is_not_whole_or_out_of_range_changes_nothing(
     count = len(words) - 5
     assert (run.returncode, words["wrong"], words["of"]) == (0, "0", str(5 + 4 * count))
     # The numbers are those that a program gets from Python, under their names.
-    numbers = settings_of(loop(name), single=single)
+    numbers = list(settings_of(loop(name), single=single).values())
     assert [float(word) for word in list(words.values())[5:]] == numbers
     # The checksum is that of zlib over version, layout and numbers.
     packed = struct.pack(f"<II{count}{'f' if single else 'd'}", 1, int(words["layout"]), *numbers)

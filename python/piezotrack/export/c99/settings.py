@@ -26,8 +26,8 @@ VERSION = 1
 
 def settings_of(
     controller: Controller, *, single: bool = False, like: Controller | None = None
-) -> list[float]:
-    """Return the numbers of a controller in the order of the settings of its export.
+) -> dict[str, float]:
+    """Return the numbers of a controller by name, in the order of the settings of its export.
 
     A program sends them to a board, which seals them and passes them to ``NAME_retune``.
 
@@ -43,7 +43,7 @@ def settings_of(
 
     Returns
     -------
-    list of float
+    dict of str to float
         The numbers.
 
     Raises
@@ -56,8 +56,9 @@ def settings_of(
     --------
     >>> import piezotrack as pt
     >>> loop = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid(kp=1e5, ti=0.5))
-    >>> [round(one, 3) for one in pt.control.settings_of(loop)]
-    [100000.0, 4000.0, 0.0, 0.04]
+    >>> settings = pt.control.settings_of(loop)
+    >>> settings["pid_proportional"], round(settings["pid_integral"], 3)
+    (100000.0, 4000.0)
     """
     expect("controller", controller, Controller, "pt.Controller")
     expect("like", like, (Controller, type(None)), "pt.Controller")
@@ -74,7 +75,7 @@ def settings_of(
     if like is not None:
         _check_like(controller, like)
         _check_ranges(values, _settings(like), single=single)
-    return values
+    return dict(zip((name for one in settings for name in one.names), values, strict=True))
 
 
 def _settings(controller: Controller) -> list[Setting]:
