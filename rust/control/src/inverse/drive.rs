@@ -16,7 +16,7 @@ const BEYOND: f64 = 1.25;
 const PLACES: u32 = 24;
 
 /// Relative difference of drives that counts as none: some 1e-16 m.
-const SAME: f64 = 1.0 / (1u64 << 40) as f64;
+const SAME: f64 = 4096.0 * f64::EPSILON;
 
 /// The state of `inverse` after a sample at which the stage got the drive `volts`, and by how much
 /// the stage was off the reference there, in displacement (m) and velocity (m/s).
