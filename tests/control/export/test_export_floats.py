@@ -13,7 +13,6 @@ from c_exports import (
     PARTS,
     PI,
     SLIDING,
-    STEP,
     STRICT,
     checked,
     compiled,
@@ -33,7 +32,7 @@ export = pt.control.export_controller
 @pytest.mark.parametrize("name", PARTS)
 def test_floats_stay_within_the_bound_that_is_stated(name: str, tmp_path: Path) -> None:
     done = export(loop(name), tmp_path, name="axis", single=True)
-    compiled(tmp_path, "check.c", "axis.c", flags=(*STRICT, "-Wdouble-promotion"))
+    compiled(tmp_path, "check.c", "axis.c", flags=STRICT)
     code, figures = checked(tmp_path)
     assert code == 0
     assert done.bound is not None
@@ -86,7 +85,7 @@ def test_floats_of_the_online_inverse_stay_within_their_bound(name: str, tmp_pat
 def figures_of(controller: pt.Controller, folder: Path) -> tuple[dict[str, float], float]:
     """Figures that the check of a float prints, and the bound that it holds them to."""
     done = export(controller, folder, name="axis", single=True)
-    compiled(folder, "axis.c", flags=(*STEP, "-c"))
+    compiled(folder, "axis.c", flags=(*STRICT, "-c"))
     compiled(folder, "check.c", "axis.c")
     code, figures = checked(folder)
     assert code == 0

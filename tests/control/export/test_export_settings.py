@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from c_exports import PARTS, PI, SLIDING, STEP, checked, compiled, learner, loop, needs_gcc
+from c_exports import PARTS, PI, SLIDING, STRICT, checked, compiled, learner, loop, needs_gcc
 from piezotrack.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -335,11 +335,11 @@ def test_the_layout_is_that_of_the_structure_not_of_the_numbers(tmp_path: Path) 
 @pytest.mark.parametrize("name", ["PID", "all", "nothing", "repetitive of the paper"])
 def test_with_fixed_numbers_there_are_no_settings(name: str, tmp_path: Path) -> None:
     done = export(loop(name), tmp_path, name="axis", fixed=True)
-    compiled(tmp_path, "axis.c", flags=(*STEP, "-c"))
+    compiled(tmp_path, "axis.c", flags=(*STRICT, "-c"))
     (tmp_path / "count.c").write_text(
         '#include "axis.h"\n#if AXIS_SETTINGS != 0\n#error settings\n#endif\n'
     )
-    compiled(tmp_path, "count.c", flags=(*STEP, "-c"))
+    compiled(tmp_path, "count.c", flags=(*STRICT, "-c"))
     compiled(tmp_path, "check.c", "axis.c")
     code, figures = checked(tmp_path)
     assert (code, figures["largest"], figures["flags"]) == (0, 0.0, 0.0)

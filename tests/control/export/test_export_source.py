@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 import piezotrack as pt
-from c_exports import PARTS, PI, STEP, checked, compiled, learner, loop, needs_gcc
+from c_exports import PARTS, PI, STRICT, checked, compiled, learner, loop, needs_gcc
 from folders import ROOT
 from piezotrack.export.c99.sources import c_sources
 from piezotrack.export.c99.text import comment_of
@@ -45,12 +45,12 @@ def test_the_tree_compiles_as_it_is_and_gives_the_bits_of_rust(name: str, tmp_pa
     """Without a word of Python between: the sources and the headers of what was chosen."""
     for options in ({"single": True}, {"fixed": True}, {}):
         arguments = in_the_tree(name, tmp_path, **options)
-        compiled(tmp_path, *arguments, "-c", flags=(*STEP, "-Wundef"))
+        compiled(tmp_path, *arguments, "-c", flags=(*STRICT, "-Wundef"))
     # The check of the joined export, around the tree.
     export(loop(name), tmp_path, name="NAME")
     for ending in ("c", "h"):
         (tmp_path / f"NAME.{ending}").unlink()
-    compiled(tmp_path, "check.c", *arguments, flags=(*STEP[:6], f"-I{TREE}"))
+    compiled(tmp_path, "check.c", *arguments, flags=(*STRICT, f"-I{TREE}"))
     code, figures = checked(tmp_path)
     assert (code, figures["largest"], figures["flags"]) == (0, 0.0, 0.0)
 
@@ -101,7 +101,7 @@ def test_nothing_is_called_on_bare_metal(name: str, single: bool, tmp_path: Path
     """No memset or memcpy of the compiler's making, no double on a unit of single precision."""
     export(loop(name), tmp_path, name="axis", single=single)
     for optimised in ("-O2", "-O3", "-Os"):
-        command = ["arm-none-eabi-gcc", *CORES[single], *STEP, optimised, "-nostdlib", "-c"]
+        command = ["arm-none-eabi-gcc", *CORES[single], *STRICT, optimised, "-nostdlib", "-c"]
         subprocess.run([*command, "axis.c", "-o", "axis.o"], cwd=tmp_path, check=True)
         undefined = subprocess.run(
             ["arm-none-eabi-nm", "-u", "axis.o"],
@@ -182,7 +182,7 @@ def test_a_text_of_the_file_does_not_leave_its_comment(text: str, tmp_path: Path
     assert source.isascii()
     assert b"??" not in source
     assert b"\\\n" not in source
-    compiled(tmp_path, "check.c", "axis.c", flags=STEP[:6])
+    compiled(tmp_path, "check.c", "axis.c", flags=STRICT)
     assert checked(tmp_path)[0] == 0
     names = subprocess.run(
         ["nm", "check"], cwd=tmp_path, capture_output=True, text=True, check=True
@@ -247,10 +247,10 @@ def test_the_square_root_of_a_float_is_that_of_the_library(tmp_path: Path) -> No
 def test_a_step_passes_every_warning(name: str, tmp_path: Path) -> None:
     for single in (False, True):
         export(loop(name), tmp_path, name="axis", single=single)
-        compiled(tmp_path, "axis.c", "-c", flags=STEP)
+        compiled(tmp_path, "axis.c", "-c", flags=STRICT)
     # The header stands alone, and says what comes in and goes out.
     (tmp_path / "alone.c").write_text('#include "axis.h"\ntypedef int nothing;\n')
-    compiled(tmp_path, "alone.c", "-c", flags=STEP)
+    compiled(tmp_path, "alone.c", "-c", flags=STRICT)
 
 
 def test_the_header_says_units_ranges_and_flags(tmp_path: Path) -> None:
