@@ -94,7 +94,7 @@ def figures_of(controller: pt.Controller, folder: Path) -> tuple[dict[str, float
 
 
 def disturbance(**given: Any) -> pt.control.DisturbanceObserver:
-    known = {"pid": PI, "plant_gain": 1.5e-6, "cutoff": 1.0, "plant_time": 0.05}
+    known: dict[str, Any] = {"pid": PI, "plant_gain": 1.5e-6, "cutoff": 1.0, "plant_time": 0.05}
     return pt.control.DisturbanceObserver(**(known | given))
 
 
