@@ -59,7 +59,7 @@ def export_command(
     motion: Motion,
     output: Output,
 ) -> None:
-    """Write a controller as C code, coefficients or an FMU."""
+    """Write a controller as C code, firmware, coefficients or an FMU."""
     from ...export.write import export_controller, export_files
 
     chosen = controller.stem.replace("-", "_") if name is None else name
