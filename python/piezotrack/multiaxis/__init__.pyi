@@ -1,0 +1,11 @@
+# The public names and their homes, each written once: type checkers read them here, and
+# _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
+from .approximation import MultiAxisResponse as MultiAxisResponse
+from .approximation import approximate_axes as approximate_axes
+from .identify import identify_axes as identify_axes
+from .modal_model import AxesLevel as AxesLevel
+from .modal_model import MultiAxisModel as MultiAxisModel
+from .modal_model import MultiAxisMotion as MultiAxisMotion
+from .modal_terms import ModalTerms as ModalTerms
+from .record import MultiAxisRecord as MultiAxisRecord
+from .virtual import VirtualAxes as VirtualAxes
