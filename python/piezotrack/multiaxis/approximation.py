@@ -153,7 +153,9 @@ class MultiAxisResponse:
             measured = record.y[:, :, r] - record.y[:, :, r].mean(axis=(0, 2), keepdims=True).mean(
                 axis=2, keepdims=True
             )
-            together = [relative_error(measured[:, :, p], steady, skip) for p in range(record.u.shape[3])]
+            together = [
+                relative_error(measured[:, :, p], steady, skip) for p in range(record.u.shape[3])
+            ]
             errors.append(float(np.sqrt(np.mean(np.square(together)))))
         return np.array(errors)
 
@@ -264,7 +266,11 @@ def _weighted(u: Complex, y: Complex, noise: Array | None) -> tuple[Complex, Arr
             value[:, i] = np.einsum("kr,kra->ka", y[:, i], solution)
             rest = np.square(np.abs(y[:, i] - np.einsum("ka,kar->kr", value[:, i], u)))
             leverage = np.einsum("kar,kra->kr", u, solution).real
-            variance = scatter[:, i] if distortion is None else scatter[:, i] + distortion[:, i, np.newaxis]
+            variance = (
+                scatter[:, i]
+                if distortion is None
+                else scatter[:, i] + distortion[:, i, np.newaxis]
+            )
             spread[:, i] = np.einsum("kr,kra->ka", variance, np.square(np.abs(solution)))
             excess[:, i] = (w * rest).sum(axis=1) - (w * (1.0 - leverage) * scatter[:, i]).sum(1)
             sizes[:, i] = (w * (1.0 - leverage)).sum(axis=1)

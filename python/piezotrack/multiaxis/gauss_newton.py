@@ -8,6 +8,7 @@ normal equations follow from the inner products of these functions.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,8 +29,9 @@ DAMPING, LEAST, DOWN, UP = 1e-3, 1e-8, 0.2, 10.0
 TRIES = 14
 # Largest step of the logarithm of a decay, and of an angle in decays.
 DECAY, TURN = 0.7, 2.0
-# Least decay of a pole per sample, in distances of the lines: narrower modes are not seen.
-NARROWEST = 0.5
+# Least decay of a pole per sample, in distances of the lines: narrower modes are not seen. Outside
+# the band it is the distance from the band too.
+NARROWEST = 1.0
 # What a step of a pole by its scale costs at least, relative to the misfit: poles that the
 # response does not show stay where they are.
 HELD = 1e-6
@@ -56,10 +58,17 @@ class Target:
     value: Complex
     weight: Array
 
-    @property
-    def narrowest(self) -> float:
-        """Least decay of a pole per sample."""
-        return NARROWEST * float(np.median(np.diff(np.angle(self.z))))
+    @cached_property
+    def _ends(self) -> tuple[float, float, float]:
+        angles = np.angle(self.z)
+        least = NARROWEST * float(np.median(np.diff(angles)))
+        return least, float(angles[0]), float(angles[-1])
+
+    def narrowest(self, angles: Array) -> Array:
+        """Return the least decay per sample of poles at some angles."""
+        least, first, last = self._ends
+        angles = np.abs(np.angle(np.exp(1j * angles)))
+        return np.maximum(least, np.maximum(first - angles, angles - last))
 
     def misfit(self, terms: ModalTerms) -> tuple[float, Complex]:
         """Return the weighted sum of squared errors, and the errors."""
@@ -105,7 +114,7 @@ def refine(
         slope /= scale
         for _ in range(TRIES):
             step = np.linalg.solve(normal + damping * np.eye(slope.size), slope) / scale
-            moved = _moved(terms, step, decay, target.narrowest)
+            moved = _moved(target, terms, step)
             reached, rest = target.misfit(moved)
             if reached < cost:
                 break
@@ -157,19 +166,16 @@ def pole_deviations(target: Target, terms: ModalTerms, variance: Array) -> Array
     return np.sqrt(np.maximum(np.diag(covariance)[: 2 * modes], 0.0)).reshape(2, modes)
 
 
-def _moved(terms: ModalTerms, step: Array, decay: Array, narrowest: float) -> ModalTerms:
+def _moved(target: Target, terms: ModalTerms, step: Array) -> ModalTerms:
     """Return terms after a step of all unknowns, those of the poles limited."""
     modes, (sensors, drives) = terms.poles.size, terms.direct.shape
     cuts = np.cumsum([modes, modes, *2 * [modes * sensors], *2 * [modes * drives]])
     slower, turned, *parts, direct = np.split(step, cuts)
-    slower = np.clip(slower, -DECAY, DECAY)
-    turned = np.clip(turned, -TURN * decay, TURN * decay)
-    poles = np.exp(
-        -np.maximum(decay * np.exp(slower), narrowest) + 1j * (np.angle(terms.poles) + turned)
-    )
-    c, b = (
-        (parts[k] + 1j * parts[k + 1]).reshape(modes, -1) for k in (0, 2)
-    )
+    decay = -np.log(np.abs(terms.poles))
+    angles = np.angle(terms.poles) + np.clip(turned, -TURN * decay, TURN * decay)
+    decay = np.maximum(decay * np.exp(np.clip(slower, -DECAY, DECAY)), target.narrowest(angles))
+    poles = np.exp(-decay + 1j * angles)
+    c, b = ((parts[k] + 1j * parts[k + 1]).reshape(modes, -1) for k in (0, 2))
     return ModalTerms(
         poles, terms.inputs + b, terms.outputs + c, terms.direct + direct.reshape(sensors, drives)
     )
@@ -186,7 +192,9 @@ def _derivatives(terms: ModalTerms) -> tuple[Complex, Places, Places]:
     shift = (terms.poles * np.log(np.abs(terms.poles)))[:, np.newaxis, np.newaxis] * residues
     turn = (1j * terms.poles)[:, np.newaxis, np.newaxis] * residues
     rows = np.eye(sensors)[np.newaxis, :, :, np.newaxis] * terms.inputs[:, np.newaxis, np.newaxis]
-    columns = np.eye(drives)[np.newaxis, :, np.newaxis] * terms.outputs[:, np.newaxis, :, np.newaxis]
+    columns = (
+        np.eye(drives)[np.newaxis, :, np.newaxis] * terms.outputs[:, np.newaxis, :, np.newaxis]
+    )
     c = rows.reshape(-1, sensors, drives)
     b = columns.reshape(-1, sensors, drives)
     size = sensors * drives

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,7 +89,7 @@ def identify_axes(
         expect("records", record, MultiAxisRecord, "a MultiAxisRecord or a list of them")
         check_same(records[0], record, k)
     records.sort(key=lambda one: one.level)
-    for lower, upper in zip(records[:-1], records[1:], strict=True):
+    for lower, upper in itertools.pairwise(records):
         if upper.level < DISTINCT * lower.level:
             raise ParameterError(
                 "records",

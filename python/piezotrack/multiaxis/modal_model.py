@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from .. import _core
-from .._support.arguments import expect, has_entries, one_of, positive
+from .._support.arguments import expect, one_of, positive
 from .._support.arrays import real_array
 from .._support.display.result import Result
 from .._support.files.writing import write_result
 from ..errors import DataError, ParameterError, ShapeError
-from .modal_terms import ModalTerms
 from .record import MultiAxisRecord, relative_error
 
 if TYPE_CHECKING:
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from .approximation import MultiAxisResponse
+    from .modal_terms import ModalTerms
 
     Array = NDArray[np.float64]
     Complex = NDArray[np.complex128]
@@ -87,8 +87,8 @@ class MultiAxisModel(Result):
         {z - \bar p_i}
 
     sampled with a held drive, stable. Between two levels logarithms of poles, b, c and D are
-    interpolated linearly in the logarithm of the root mean square of the drives; below the least
-    level and above the largest they are those of that level.
+    interpolated linearly in the square root of the level, the root mean square of the drives; below
+    the least level and above the largest they are those of that level.
 
     Attributes
     ----------
@@ -196,7 +196,7 @@ class MultiAxisModel(Result):
         ndarray, shape (sensors, drives)
             Gains [m/V].
         """
-        return self.response([0.0], level=level)[0].real
+        return np.asarray(self.response([0.0], level=level)[0].real)
 
     def frequencies(self, *, level: float | None = None) -> Array:
         """Return the undamped frequencies of the modes [Hz]; parameters as of `at`."""
@@ -266,9 +266,7 @@ class MultiAxisModel(Result):
         y, last = terms.simulate(moved, state)
         return MultiAxisMotion(y + offset, last)
 
-    def score(
-        self, record: MultiAxisRecord, *, skip: int = 100, start: str = "periodic"
-    ) -> Array:
+    def score(self, record: MultiAxisRecord, *, skip: int = 100, start: str = "periodic") -> Array:
         """Compare the simulation of a record with its displacements.
 
         Parameters
@@ -338,7 +336,7 @@ class MultiAxisModel(Result):
     @property
     def table(self) -> dict[str, Array]:
         """Columns of the modes: frequencies and damping ratios at each level."""
-        columns: dict[str, Array] = {"mode": np.arange(self.states // 2)}
+        columns: dict[str, Array] = {"mode": np.arange(self.states // 2, dtype=np.float64)}
         for one in self.levels:
             name = f"{one.level:.4g}_{self.drive_unit}"
             columns[f"frequency_Hz_at_{name}"] = self.frequencies(level=one.level)
@@ -370,8 +368,8 @@ class MultiAxisModel(Result):
         if level is None:
             middle = self.levels[len(self.levels) // 2]
             return middle, middle, 0.0
-        known = np.log([one.level for one in self.levels])
-        wanted = float(np.clip(np.log(positive("level", level, "V")), known[0], known[-1]))
+        known = np.sqrt([one.level for one in self.levels])
+        wanted = float(np.clip(np.sqrt(positive("level", level, "V")), known[0], known[-1]))
         k = min(max(int(np.searchsorted(known, wanted)) - 1, 0), max(len(known) - 2, 0))
         lower, upper = self.levels[k], self.levels[min(k + 1, len(known) - 1)]
         if lower is upper:

@@ -64,9 +64,7 @@ class ModalTerms:
         size = np.linalg.norm(b, axis=1)
         largest = b[np.arange(poles.size), np.abs(b).argmax(axis=1)]
         factor = np.sqrt(np.linalg.norm(c, axis=1) / size) * np.abs(largest) / largest
-        return ModalTerms(
-            poles, b * factor[:, np.newaxis], c / factor[:, np.newaxis], self.direct
-        )
+        return ModalTerms(poles, b * factor[:, np.newaxis], c / factor[:, np.newaxis], self.direct)
 
     def scaled(self, factor: float) -> ModalTerms:
         """Return the terms of a response that is larger by a factor."""
@@ -97,11 +95,11 @@ class ModalTerms:
     def core(self) -> _core.ModalSystem:
         """The system in the compiled core, which simulates it."""
         sensors, drives = self.direct.shape
-        parts = [
+        poles, inputs, outputs = (
             (part.real.ravel(), part.imag.ravel())
             for part in (self.poles, self.inputs, self.outputs)
-        ]
-        return _core.ModalSystem(drives, sensors, *parts, self.direct.ravel())
+        )
+        return _core.ModalSystem(drives, sensors, poles, inputs, outputs, self.direct.ravel())
 
     def simulate(self, drive: Array, state: Complex) -> tuple[Array, Complex]:
         """Return outputs, shape (samples, sensors), and the state after a drive from a state."""

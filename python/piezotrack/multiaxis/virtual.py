@@ -77,8 +77,8 @@ class VirtualAxes:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        frequencies = np.array(numbers("frequencies", self.frequencies), ndmin=1)
-        damping = np.array(numbers("damping_ratios", self.damping_ratios), ndmin=1)
+        frequencies = np.array(numbers("frequencies", self.frequencies, "Hz"))
+        damping = np.array(numbers("damping_ratios", self.damping_ratios, ""))
         object.__setattr__(self, "dt", check_dt(self.dt))
         half = 0.5 / self.dt
         for frequency in frequencies:
@@ -186,8 +186,8 @@ class VirtualAxes:
         Parameters
         ----------
         realisations : int, optional
-            Number of realisations, orthogonal in blocks of as many as there are drives (Dobrowiecki,
-            Schoukens and Guillaume 2006, doi 10.1109/TIM.2006.881571).
+            Number of realisations, orthogonal in blocks of as many as there are drives
+            (Dobrowiecki, Schoukens and Guillaume 2006, doi 10.1109/TIM.2006.881571).
         periods : int, optional
             Number of periods.
         samples : int, optional
