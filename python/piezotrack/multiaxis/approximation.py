@@ -150,12 +150,9 @@ class MultiAxisResponse:
             answer = np.zeros((found.shape[0], record.sensors), dtype=np.complex128)
             answer[places] = np.einsum("kij,kj->ki", self.value, found[places])
             steady = np.fft.irfft(answer, self.samples, axis=0)
-            measured = record.y[:, :, r] - record.y[:, :, r].mean(axis=(0, 2), keepdims=True).mean(
-                axis=2, keepdims=True
-            )
-            together = [
-                relative_error(measured[:, :, p], steady, skip) for p in range(record.u.shape[3])
-            ]
+            measured = np.moveaxis(record.y[:, :, r], 2, 0)
+            measured = measured - measured.mean(axis=(0, 1))
+            together = [relative_error(one, steady, skip) for one in measured]
             errors.append(float(np.sqrt(np.mean(np.square(together)))))
         return np.array(errors)
 

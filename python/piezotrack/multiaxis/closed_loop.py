@@ -42,9 +42,9 @@ class AxesMargins:
     .. math:: M_s = 1 / \min_\omega \underline\sigma(I + L), \qquad
         M_t = \max_\omega \overline\sigma(L (I + L)^{-1})
 
-    with L at the sensors. They hold for a gain or a phase that changes in all loops at once, as a
-    multiple of the identity (Skogestad and Postlethwaite, Multivariable Feedback Control, 2nd ed.,
-    2005, section 9.2).
+    with L at the sensors. The margins that follow hold where gain or phase at the sensors change,
+    in one loop or in each by itself (Skogestad and Postlethwaite, Multivariable Feedback Control,
+    2nd ed., 2005, chapter 9).
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class AxesMargins:
 
     @property
     def gain_margin(self) -> float:
-        """Factor by which the gain of all loops may rise at least, from Ms and Mt."""
+        """Factor by which gains may rise at least, from Ms and Mt."""
         from_s = self.sensitivity / (self.sensitivity - 1.0) if self.sensitivity > 1.0 else np.inf
         if not self.stable:
             return 1.0
@@ -79,7 +79,7 @@ class AxesMargins:
 
     @property
     def phase_margin(self) -> float:
-        """Lag of all loops that is allowed at least, from Ms and Mt [deg]."""
+        """Lag that is allowed at least, from Ms and Mt [deg]."""
         if not self.stable:
             return 0.0
         peak = min(self.sensitivity, self.complementary)
@@ -273,7 +273,7 @@ def track_axes(
     >>> stage = pt.multiaxis.VirtualAxes.three()
     >>> wanted = np.zeros((4000, 3))
     >>> wanted[500:, 0] = 1e-6
-    >>> run = pt.multiaxis.track_axes(stage, wanted, pt.Pid(kp=0.0005, ti=5e-5))
+    >>> run = pt.multiaxis.track_axes(stage, wanted, pt.Pid(kp=0.005, ti=5e-4))
     >>> bool(abs(run.error[-1]).max() < 1e-9)
     True
     """

@@ -31,7 +31,7 @@ TRIES = 14
 DECAY, TURN = 0.7, 2.0
 # Least decay of a pole per sample, in distances of the lines: narrower modes are not seen. Outside
 # the band it is the distance from the band too.
-NARROWEST = 1.0
+NARROWEST = 0.2
 # What a step of a pole by its scale costs at least, relative to the misfit: poles that the
 # response does not show stay where they are.
 HELD = 1e-6

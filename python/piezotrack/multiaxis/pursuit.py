@@ -19,7 +19,7 @@ __all__ = ["Pursued", "pursue"]
 
 # Decays of the candidates, in distances of the lines: the least, their ratio, the largest per
 # sample; and their distances, in decays.
-NARROW, RATIO, WIDE, APART = 2.0, 2.0, 1.5, 1.5
+NARROW, RATIO, WIDE, APART = 1.0, 2.0, 1.5, 1.5
 # Most entries of the table of candidates.
 MOST_ENTRIES = 12_000_000
 # Steps after each new mode, and at the end.
