@@ -73,6 +73,20 @@ def test_a_known_stage_is_recovered_within_its_standard_deviations() -> None:
     assert np.sqrt(np.mean(np.square(scores))) == pytest.approx(1.0, abs=0.24)
 
 
+@pytest.mark.parametrize("realisations", [4, 9])
+def test_modes_do_not_follow_the_distortion(realisations: int) -> None:
+    stage = VirtualAxes.three(noise=2e-9, seed=1, cubic=0.04)
+    record = stage.record(realisations=realisations)
+    found, own = identify_axes(record), approximate_axes(record)
+    assert found.states == 10
+    # Gain of u + a u^3 for a normal input of 1 V rms (Bussgang).
+    truth = (1.0 + 3.0 * 0.04) * stage.terms.response(own.z)
+    errors = [
+        np.linalg.norm(value - truth) for value in (found.at().response(own.z), own.value)
+    ]
+    assert errors[0] < 0.4 * errors[1]
+
+
 def test_what_is_left_is_what_noise_explains(model: MultiAxisModel) -> None:
     assert model.levels[0].misfit == pytest.approx(model.levels[0].expected, rel=0.1)
     assert not model.notes

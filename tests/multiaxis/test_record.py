@@ -55,9 +55,14 @@ def test_one_realisation_for_three_drives_is_refused() -> None:
 
 
 def test_realisations_that_repeat_each_other_are_refused() -> None:
-    same = np.repeat(NOISE[:, :, :1], 4, axis=2)
+    same = np.repeat(NOISE[:, :, :1, :1], 4, axis=2)
     with pytest.raises(pt.DataError, match="depend on each other"):
         pt.multiaxis.approximate_axes(record(u=same, y=same))
+
+
+def test_drives_that_do_not_repeat_are_refused() -> None:
+    with pytest.raises(pt.DataError, match="periods of the drives differ by .* % of their rms"):
+        pt.multiaxis.approximate_axes(record())
 
 
 def test_records_of_other_axes_or_of_one_level_are_refused() -> None:

@@ -14,5 +14,6 @@ from .modal_model import MultiAxisModel as MultiAxisModel
 from .modal_model import MultiAxisMotion as MultiAxisMotion
 from .modal_terms import ModalTerms as ModalTerms
 from .model_file import load_axes as load_axes
+from .reading import read_axes as read_axes
 from .record import MultiAxisRecord as MultiAxisRecord
 from .virtual import VirtualAxes as VirtualAxes

@@ -26,6 +26,8 @@ SMOOTH, PASSES = 5, 4
 FLOOR = 0.05
 # Noise of a realisation in medians of all, from which it is named.
 NOISY = 3.0
+# Largest rms difference of the periods of a drive, relative to its rms.
+REPEATS = 0.2
 # Largest condition number of the drives at a line.
 CONDITION = 1e6
 # Variance of a response without noise, relative to its mean square.
@@ -199,7 +201,7 @@ def approximate_axes(record: MultiAxisRecord) -> MultiAxisResponse:
     lines = record.lines()
     drive, output = _spectra(record.u, lines), _spectra(record.y, lines)
     u, y = drive.mean(axis=3), output.mean(axis=3)
-    _check_drives(record, u)
+    _check_drives(record, drive)
     periods = record.u.shape[3]
     noise = None
     if periods > 1:
@@ -298,10 +300,18 @@ def _check_realisations(record: MultiAxisRecord) -> None:
         )
 
 
-def _check_drives(record: MultiAxisRecord, u: Complex) -> None:
-    """Refuse drives that are dependent at most lines."""
-    if not u.size:
+def _check_drives(record: MultiAxisRecord, drive: Complex) -> None:
+    """Refuse drives that do not repeat, or are dependent at most lines."""
+    if not drive.size:
         raise DataError("the drives share no line: expected multisines on the same lines")
+    u = drive.mean(axis=3)
+    apart = np.square(np.abs(drive - u[..., np.newaxis])).mean()
+    if apart > REPEATS**2 * np.square(np.abs(drive)).mean():
+        share = 100.0 * np.sqrt(apart / np.square(np.abs(drive)).mean())
+        raise DataError(
+            f"the periods of the drives differ by {share:.2g} % of their rms: expected drives that "
+            "repeat"
+        )
     worst = float(np.median(np.linalg.cond(u)))
     if not worst < CONDITION:
         raise DataError(

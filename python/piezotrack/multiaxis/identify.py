@@ -29,6 +29,10 @@ CAP, MOST_STATES = 44, 120
 DISTINCT = 1.02
 # Misfit in expected ones from which the modes do not describe a response.
 APART = 1.3
+# Power of the variance by which lines are weighted while modes are sought, and at the end where
+# they describe the response: near the inverse, yet lines of small variance do not rule alone.
+# Largest mean square error, in variances, for which they do.
+VARIANCE, DESCRIBED = 0.75, 1.15
 
 
 def identify_axes(
@@ -40,10 +44,11 @@ def identify_axes(
     """Identify the modes of a stage of several axes.
 
     The best linear approximation of each record is fitted by modes in parallel, each of rank one
-    with one pole for all drives and sensors, by least squares weighted by the power of the drives:
-    what is minimised is the error of the displacement under such drives. Modes are sought at the
-    middle level, and refined from there at the others, so that they are the same at all levels.
-    Two runs give the same bits.
+    with one pole for all drives and sensors, by weighted least squares. Weights are near the
+    inverse of the variance where the modes then describe the response within it; otherwise they
+    are the power of the drives, so that the error of the displacement under such drives is least.
+    Modes are sought at the middle level, and refined from there at the others, so that they are
+    the same at all levels. Two runs give the same bits.
 
     Parameters
     ----------
@@ -101,19 +106,20 @@ def identify_axes(
     responses = [approximate_axes(record) for record in records]
     for response in responses:
         _check_lines(response, modes)
-    targets = [_target(response) for response in responses]
     middle = len(records) // 2
     scale = float(np.sqrt(np.mean(np.square(np.abs(responses[middle].value)))))
-    found: dict[int, ModalTerms] = {}
-    target, expected = _scaled(targets[middle], scale), _expected(responses[middle]) / scale**2
-    found[middle] = pursue(target, expected, modes, fixed=states is not None).terms
+    target = _target(responses[middle], scale, VARIANCE)
+    expected = _expected(responses[middle], scale, target)
+    start = pursue(target, expected, modes, fixed=states is not None).terms
+    power = VARIANCE if target.misfit(start)[0] < DESCRIBED * expected else 0.0
+    targets = [_target(response, scale, power) for response in responses]
+    found = {middle: refine(targets[middle], start, LAST_STEPS, LAST_TOLERANCE)[0]}
     # Outwards from the middle, each level from the one beside it.
     for k in [*range(middle - 1, -1, -1), *range(middle + 1, len(records))]:
         start = found[k + 1] if k < middle else found[k - 1]
-        found[k], _, _ = refine(_scaled(targets[k], scale), start, LAST_STEPS, LAST_TOLERANCE)
+        found[k], _, _ = refine(targets[k], start, LAST_STEPS, LAST_TOLERANCE)
     levels = tuple(
-        _level(response, _scaled(targets[k], scale), found[k], scale)
-        for k, response in enumerate(responses)
+        _level(response, targets[k], found[k], scale) for k, response in enumerate(responses)
     )
     notes = []
     for one, response in zip(levels, responses, strict=True):
@@ -153,33 +159,32 @@ def _check_lines(response: MultiAxisResponse, modes: int) -> None:
         )
 
 
-def _target(response: MultiAxisResponse) -> Target:
-    return Target(response.z, response.value, response.power / response.power.mean())
+def _target(response: MultiAxisResponse, scale: float, power: float) -> Target:
+    """Return a response in a unit, weighted by drives and by a power of the inverse variance."""
+    weight = response.power * response.variance.mean(axis=(1, 2)) ** -power
+    return Target(response.z, response.value / scale, weight / weight.mean())
 
 
-def _scaled(target: Target, scale: float) -> Target:
-    return Target(target.z, target.value / scale, target.weight)
-
-
-def _expected(response: MultiAxisResponse) -> float:
+def _expected(response: MultiAxisResponse, scale: float, target: Target) -> float:
     """Return the weighted sum of squared errors that noise and distortion make expected."""
-    weight = response.power / response.power.mean()
-    return float(np.einsum("k,kij->", weight, response.variance))
+    return float(np.einsum("k,kij->", target.weight, response.variance)) / scale**2
 
 
 def _level(
     response: MultiAxisResponse, target: Target, terms: ModalTerms, scale: float
 ) -> AxesLevel:
-    cost, _ = target.misfit(terms)
-    size = float(np.einsum("k,kij->", target.weight, np.square(np.abs(target.value))))
     decay_sd, angle_sd = pole_deviations(target, terms, response.variance / scale**2)
+    # Whatever was minimised, errors are those of the displacement.
+    plain = _target(response, scale, 0.0)
+    cost, _ = plain.misfit(terms)
+    size = float(np.einsum("k,kij->", plain.weight, np.square(np.abs(plain.value))))
     return AxesLevel(
         level=response.level,
         terms=terms.scaled(scale).balanced(),
         decay_sd=decay_sd,
         angle_sd=angle_sd,
         misfit=float(np.sqrt(cost / size)),
-        expected=float(np.sqrt(_expected(response) / scale**2 / size)),
+        expected=float(np.sqrt(_expected(response, scale, plain) / size)),
         drive_mean=response.drive_mean,
         output_mean=response.output_mean,
     )
