@@ -35,6 +35,9 @@ NARROWEST = 0.2
 # What a step of a pole by its scale costs at least, relative to the misfit: poles that the
 # response does not show stay where they are.
 HELD = 1e-6
+# Scale of a departure: of the logarithm of a decay, and of b and c relative to their size; that of
+# an angle is the decay.
+FREE = 0.3
 # Eigenvalues of the scaled normal equations, relative to the largest, that are directions of
 # the gauge.
 GAUGE = 1e-10
@@ -78,7 +81,12 @@ class Target:
 
 
 def refine(
-    target: Target, terms: ModalTerms, iterations: int, tolerance: float
+    target: Target,
+    terms: ModalTerms,
+    iterations: int,
+    tolerance: float,
+    *,
+    held: float = 0.0,
 ) -> tuple[ModalTerms, float, Complex]:
     """Descend from some terms.
 
@@ -92,6 +100,9 @@ def refine(
         Most steps.
     tolerance : float
         Relative reduction of the misfit below which the descent ends.
+    held : float, optional
+        Price of a departure from the start by its scale, in the unit of the misfit: directions that
+        the response does not show stay there, so that the modes remain the same ones.
 
     Returns
     -------
@@ -99,34 +110,64 @@ def refine(
         Where it ended, as of `Target.misfit`.
     """
     terms = terms.balanced()
+    start = terms
     cost, error = target.misfit(terms)
     damping = DAMPING
     for _ in range(iterations):
         normal, slope = _normal_equations(target, terms, error)
+        before = cost
+        if held:
+            distance, size = _departure(start, terms)
+            normal += np.diag(held / np.square(size))
+            slope -= held * distance / np.square(size)
+            before += held * float(np.sum(np.square(distance / size)))
         decay = -np.log(np.abs(terms.poles))
         modes = terms.poles.size
-        held = np.zeros(slope.size)
-        held[:modes] = HELD * cost
-        held[modes : 2 * modes] = HELD * cost / np.square(decay)
-        scale = np.sqrt(np.diag(normal) + held)
+        least = np.zeros(slope.size)
+        least[:modes] = HELD * cost
+        least[modes : 2 * modes] = HELD * cost / np.square(decay)
+        scale = np.sqrt(np.diag(normal) + least)
         scale[scale == 0.0] = 1.0
         normal /= np.outer(scale, scale)
         slope /= scale
         for _ in range(TRIES):
             step = np.linalg.solve(normal + damping * np.eye(slope.size), slope) / scale
             moved = _moved(target, terms, step)
-            reached, rest = target.misfit(moved)
-            if reached < cost:
+            left, rest = target.misfit(moved)
+            reached = left
+            if held:
+                distance, size = _departure(start, moved)
+                reached += held * float(np.sum(np.square(distance / size)))
+            if reached < before:
                 break
             damping *= UP
         else:
             break
-        gained = (cost - reached) / cost
-        terms, cost, error = moved.balanced(), reached, rest
+        gained = (before - reached) / before
+        terms, cost, error = moved.balanced(), left, rest
         damping = max(DOWN * damping, LEAST)
         if gained < tolerance:
             break
     return terms, cost, error
+
+
+def _departure(start: ModalTerms, terms: ModalTerms) -> tuple[Array, Array]:
+    """Return how far the unknowns are from a start, and their scales, infinite for D."""
+    b, c = start.aligned(terms)
+    decay = -np.log(np.abs(start.poles))
+    slower = np.log(np.log(np.abs(terms.poles)) / np.log(np.abs(start.poles)))
+    turned = np.angle(terms.poles / start.poles)
+    parts, sizes = [slower, turned], [np.full(decay.size, FREE), decay]
+    for mine, own in ((terms.outputs, c), (terms.inputs, b)):
+        away = (mine - own).ravel()
+        size = FREE * np.repeat(np.linalg.norm(own, axis=1), own.shape[1])
+        parts += [away.real, away.imag]
+        sizes += [size, size]
+    count = terms.direct.size
+    return (
+        np.concatenate([*parts, np.zeros(count)]),
+        np.concatenate([*sizes, np.full(count, np.inf)]),
+    )
 
 
 def pole_deviations(target: Target, terms: ModalTerms, variance: Array) -> Array:

@@ -33,6 +33,8 @@ APART = 1.3
 # they describe the response: near the inverse, yet lines of small variance do not rule alone.
 # Largest mean square error, in variances, for which they do.
 VARIANCE, DESCRIBED = 0.75, 1.15
+# Price of a departure from the modes of the level beside, in mean square errors of a number.
+HELD = 100.0
 
 
 def identify_axes(
@@ -117,7 +119,8 @@ def identify_axes(
     # Outwards from the middle, each level from the one beside it.
     for k in [*range(middle - 1, -1, -1), *range(middle + 1, len(records))]:
         start = found[k + 1] if k < middle else found[k - 1]
-        found[k], _, _ = refine(targets[k], start, LAST_STEPS, LAST_TOLERANCE)
+        held = HELD * _expected(responses[k], scale, targets[k]) / (2 * targets[k].value.size)
+        found[k], _, _ = refine(targets[k], start, LAST_STEPS, LAST_TOLERANCE, held=held)
     levels = tuple(
         _level(response, targets[k], found[k], scale) for k, response in enumerate(responses)
     )

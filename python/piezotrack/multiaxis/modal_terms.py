@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 __all__ = ["ModalTerms"]
 
+# Overlap of two shapes from which they are one mode; damping ratio from which a pole is none.
+ALIKE, DAMPED = 0.5, 0.3
+TINY = 1e-300
+
 
 @dataclass(frozen=True, eq=False)
 class ModalTerms:
@@ -70,24 +74,50 @@ class ModalTerms:
         """Return the terms of a response that is larger by a factor."""
         return ModalTerms(self.poles, self.inputs, factor * self.outputs, factor * self.direct)
 
+    def aligned(self, other: ModalTerms) -> tuple[Complex, Complex]:
+        """Return b and c, turned and sized so that b is as near to that of others as it can."""
+        overlap = np.sum(self.inputs.conj() * other.inputs, axis=1)
+        size = np.linalg.norm(other.inputs, axis=1) / np.linalg.norm(self.inputs, axis=1)
+        turn = np.where(overlap == 0.0, 1.0, overlap / np.maximum(np.abs(overlap), TINY))
+        turn = (turn * size)[:, np.newaxis]
+        return self.inputs * turn, self.outputs / turn
+
     def between(self, other: ModalTerms, share: float) -> ModalTerms:
         """Return the terms a share of the way to others with the same modes.
 
-        Logarithms of the poles, b, c and D are interpolated, b of `other` being turned and sized
-        to be as near to b as it can.
+        Logarithms of the poles, b, c and D are interpolated, b and c of `other` as of `aligned`. A
+        term that is strongly damped or has another shape in both
+        is no mode that moved: it is taken from both, by their shares.
         """
         overlap = np.sum(other.inputs.conj() * self.inputs, axis=1)
-        size = np.linalg.norm(self.inputs, axis=1) / np.linalg.norm(other.inputs, axis=1)
-        turn = np.where(overlap == 0.0, 1.0, overlap / np.maximum(np.abs(overlap), 1e-300)) * size
-        b, c = other.inputs * turn[:, np.newaxis], other.outputs / turn[:, np.newaxis]
+        crossed = np.abs(np.sum(other.outputs.conj() * self.outputs, axis=1) * overlap)
+        mine, theirs = (_residue_sizes(one) for one in (self, other))
+        same = crossed > ALIKE * mine * theirs
+        for one in (self, other):
+            logarithm = np.log(one.poles)
+            same &= -logarithm.real < DAMPED * np.abs(logarithm)
+        b, c = (part[same] for part in other.aligned(self))
+        rest = ~same
 
-        def mixed(mine: Complex, theirs: Complex) -> Complex:
-            return np.asarray((1.0 - share) * mine + share * theirs)
+        def mixed(first: Complex, second: Complex) -> Complex:
+            return np.asarray((1.0 - share) * first + share * second)
 
         return ModalTerms(
-            np.exp(mixed(np.log(self.poles), np.log(other.poles))),
-            mixed(self.inputs, b),
-            mixed(self.outputs, c),
+            np.concatenate(
+                [
+                    np.exp(mixed(np.log(self.poles[same]), np.log(other.poles[same]))),
+                    self.poles[rest],
+                    other.poles[rest],
+                ]
+            ),
+            np.concatenate([mixed(self.inputs[same], b), self.inputs[rest], other.inputs[rest]]),
+            np.concatenate(
+                [
+                    mixed(self.outputs[same], c),
+                    (1.0 - share) * self.outputs[rest],
+                    share * other.outputs[rest],
+                ]
+            ),
             (1.0 - share) * self.direct + share * other.direct,
         )
 
@@ -111,3 +141,9 @@ class ModalTerms:
         """Return the state at the start of a period of a drive that repeats for ever."""
         _, last = self.simulate(drive, np.zeros(self.poles.size, dtype=np.complex128))
         return np.asarray(last / (1.0 - self.poles ** len(drive)))
+
+
+def _residue_sizes(terms: ModalTerms) -> Array:
+    """Return the norms of c b^T of each mode."""
+    sizes = np.linalg.norm(terms.inputs, axis=1) * np.linalg.norm(terms.outputs, axis=1)
+    return np.asarray(sizes)
