@@ -81,9 +81,7 @@ def test_modes_do_not_follow_the_distortion(realisations: int) -> None:
     assert found.states == 10
     # Gain of u + a u^3 for a normal input of 1 V rms (Bussgang).
     truth = (1.0 + 3.0 * 0.04) * stage.terms.response(own.z)
-    errors = [
-        np.linalg.norm(value - truth) for value in (found.at().response(own.z), own.value)
-    ]
+    errors = [np.linalg.norm(value - truth) for value in (found.at().response(own.z), own.value)]
     assert errors[0] < 0.4 * errors[1]
 
 

@@ -194,7 +194,7 @@ def approximate_axes(record: MultiAxisRecord) -> MultiAxisResponse:
     >>> stage = pt.multiaxis.VirtualAxes.three(noise=1e-9, seed=1)
     >>> response = pt.multiaxis.approximate_axes(stage.record(realisations=4))
     >>> response
-    <MultiAxisResponse: 3 x 3, 450 lines, 1.953 to 878.9 Hz, 1 V rms>
+    <MultiAxisResponse: 3 x 3, 449 lines, 1.953 to 877 Hz, 1 V rms>
     """
     expect("record", record, MultiAxisRecord, "a MultiAxisRecord")
     _check_realisations(record)

@@ -87,9 +87,10 @@ class MultiAxisModel(Result):
         {z - \bar p_i}
 
     sampled with a held drive, stable. Between two levels logarithms of poles, b, c and D are
-    interpolated linearly in the square root of the level, the root mean square of the drives; below
-    the least level and above the largest they are those of that level. A term that is strongly damped
-    or has another shape at both levels is no mode that moved: it is taken from both, by their shares.
+    interpolated linearly in the square root of the level, the root mean square of the drives;
+    below the least level and above the largest they are those of that level. A term that is
+    strongly damped or has another shape at both levels is no mode that moved: it is taken from
+    both, by their shares.
 
     Attributes
     ----------

@@ -67,7 +67,7 @@ class MultiAxisRecord:
     >>> import piezotrack as pt
     >>> noise = np.random.default_rng(1).normal(size=(64, 2, 4))
     >>> pt.multiaxis.MultiAxisRecord(u=noise, y=1e-6 * noise, dt=1e-3)
-    <MultiAxisRecord: 2 drives, 2 sensors, 4 realisations of 1 x 64 samples, 1 V rms>
+    <MultiAxisRecord: 2 drives, 2 sensors, 4 realisations of 1 x 64 samples, 0.916 V rms>
     """
 
     u: Any

@@ -64,7 +64,7 @@ class VirtualAxes:
     >>> import piezotrack as pt
     >>> stage = pt.multiaxis.VirtualAxes.three()
     >>> (1e6 * stage.static_gain).round(1).tolist()
-    [[2.2, 0.6, 0.5], [0.6, 2.0, 0.6], [0.5, 0.7, 2.1]]
+    [[2.2, 0.5, 0.3], [0.6, 2.1, 0.7], [0.4, 0.6, 2.2]]
     """
 
     frequencies: Any

@@ -64,9 +64,7 @@ def identify_command(
         Path | None,
         Option("File of simulations, to continue after an interruption", metavar="FILE"),
     ] = None,
-    period: Annotated[
-        float | None, Option("Time after which an axis repeats", TIME)
-    ] = None,
+    period: Annotated[float | None, Option("Time after which an axis repeats", TIME)] = None,
     parameters: ParameterOptions,
     report: Annotated[
         Path | None, Option("Report for other readers, .html or .pdf", metavar="FILE")
