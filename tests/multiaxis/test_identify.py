@@ -85,6 +85,31 @@ def test_modes_do_not_follow_the_distortion(realisations: int) -> None:
     assert errors[0] < 0.4 * errors[1]
 
 
+@pytest.mark.parametrize(("drives", "sensors"), [(2, 2), (1, 1), (2, 3), (3, 2)])
+def test_any_numbers_of_drives_and_sensors_do(drives: int, sensors: int) -> None:
+    three = VirtualAxes.three(noise=2e-9, seed=1)
+    stage = replace(
+        three,
+        drive_shapes=three.drive_shapes[:, :drives],
+        sensor_shapes=three.sensor_shapes[:, :sensors],
+    )
+    found = identify_axes(stage.record(samples=512))
+    assert found.static_gain().shape == (sensors, drives)
+    assert found.states == 10
+    assert found.frequencies() == pytest.approx(stage.frequencies, rel=1e-3)
+    other = replace(stage, seed=2).record(samples=512)
+    sizes = np.sqrt(np.square(other.y[100:]).mean(axis=(0, 1, 3)))
+    assert (found.score(other) < 1.1 * 2e-9 / sizes).all()
+
+
+def test_a_delay_is_described(stage: VirtualAxes) -> None:
+    record = stage.record()
+    # The readings come three samples later; the lag of an amplifier is before them.
+    y = np.roll(record.y, 3, axis=0)
+    late = identify_axes(MultiAxisRecord(u=record.u, y=y, dt=record.dt))
+    assert late.levels[0].misfit < 1.3 * late.levels[0].expected
+
+
 def test_what_is_left_is_what_noise_explains(model: MultiAxisModel) -> None:
     assert model.levels[0].misfit == pytest.approx(model.levels[0].expected, rel=0.1)
     assert not model.notes

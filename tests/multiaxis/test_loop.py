@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import piezotrack as pt
+from piezotrack import _core
 from piezotrack.multiaxis import (
     MultiAxisModel,
     VirtualAxes,
@@ -17,6 +19,9 @@ from piezotrack.multiaxis import (
     repeating_drive,
     track_axes,
 )
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 LAW = pt.Pid(kp=0.005, ti=5e-4)
 
@@ -193,3 +198,39 @@ def test_what_does_not_fit_a_loop_is_refused(
     }  # fmt: skip
     with pytest.raises(error, match=words):
         track_axes(**arguments)  # type: ignore[arg-type]
+
+
+def test_a_run_is_printed_and_saved(stage: VirtualAxes, tmp_path: Path) -> None:
+    run = track_axes(stage, step(300), LAW, noise=0.0)
+    paths = run.save(tmp_path)
+    assert {path.name for path in paths} >= {"axes_run.csv", "axes_run.json", "axes_run.png"}
+    columns = np.loadtxt(tmp_path / "axes_run.csv", delimiter=",", skiprows=1)
+    assert columns.shape == (300, 10)
+    assert columns[:, 4:7] == pytest.approx(1e6 * run.y, abs=1e-9)
+    assert f"{1e6 * run.metrics[0].max_error:.3f}" in run.summary()
+    assert "stable, Ms" in run.summary()
+
+
+@pytest.mark.parametrize(
+    ("changed", "error", "words"),
+    [
+        ({"poles": ([1.0], [0.0])}, pt.ParameterError, "poles inside the unit circle"),
+        ({"poles": ([0.5, 0.1], [0.0, 0.0])}, pt.ShapeError, "inputs has 1 entries: expected 2"),
+        ({"outputs": ([1.0], [0.0, 1.0])}, pt.ShapeError, "1 real and 2 imaginary parts"),
+        ({"direct": [1.0, 2.0]}, pt.ShapeError, "direct has 2 entries: expected 1"),
+    ],
+)
+def test_the_core_refuses_modes_that_do_not_fit(
+    changed: dict[str, object], error: type[Exception], words: str
+) -> None:
+    one = ([1.0], [0.0])
+    parts: dict[str, object] = {
+        "poles": ([0.5], [0.0]), "inputs": one, "outputs": one, "direct": [0.0], **changed
+    }  # fmt: skip
+    with pytest.raises(error, match=words):
+        _core.ModalSystem(1, 1, **parts)  # type: ignore[arg-type]
+    lag = _core.ModalSystem(1, 1, ([0.5], [0.0]), one, one, [0.0])
+    with pytest.raises(pt.ShapeError, match="state has 2 entries: expected 1"):
+        lag.simulate(([0.0, 0.0], [0.0, 0.0]), [1.0])
+    with pytest.raises(pt.ShapeError, match="drive has 0 entries"):
+        lag.simulate(([0.0], [0.0]), [])

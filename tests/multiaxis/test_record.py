@@ -61,7 +61,7 @@ def test_realisations_that_repeat_each_other_are_refused() -> None:
 
 
 def test_drives_that_do_not_repeat_are_refused() -> None:
-    with pytest.raises(pt.DataError, match="periods of the drives differ by .* % of their rms"):
+    with pytest.raises(pt.DataError, match=r"periods of the drives differ by .* % of their rms"):
         pt.multiaxis.approximate_axes(record())
 
 

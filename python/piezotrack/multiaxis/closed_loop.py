@@ -10,7 +10,8 @@ import numpy as np
 from .. import _core
 from .._support.arguments import expect, has_entries, not_negative, one_of
 from .._support.arrays import real_array
-from .._support.display.result import Viewed
+from .._support.display.result import Result
+from .._support.files.writing import write_result
 from .._support.statistics import ErrorStatistics
 from ..control.laws.pid import Pid
 from ..errors import ParameterError, ShapeError
@@ -19,7 +20,9 @@ from .modal_model import MultiAxisModel
 from .virtual import VirtualAxes
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -96,8 +99,8 @@ class AxesMargins:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class MultiAxisTracking(Viewed):
-    """Motion of several axes in a closed loop.
+class MultiAxisTracking(Result):
+    """Motion of several axes in a closed loop; printed, the errors of each.
 
     Attributes
     ----------
@@ -113,7 +116,10 @@ class MultiAxisTracking(Viewed):
         Description of the loop.
     """
 
-    views: ClassVar[Mapping[str, str]] = {"plot": "multiaxis.views.model_plot:plot_tracking"}
+    views: ClassVar[Mapping[str, str]] = {
+        "summary": "multiaxis.views.model_text:axes_tracking_text",
+        "plot": "multiaxis.views.model_plot:plot_tracking",
+    }
 
     reference: Array
     y: Array
@@ -143,6 +149,63 @@ class MultiAxisTracking(Viewed):
         """Peak motion of each axis off its reference, relative to the largest stroke of all."""
         stroke = np.ptp(self.reference, axis=0).max()
         return np.asarray(np.abs(self.error).max(axis=0) / stroke)
+
+    @property
+    def table(self) -> dict[str, Array]:
+        """Columns of the signals, with their units in the names."""
+        columns = {"time_s": self.dt * np.arange(len(self.y), dtype=np.float64)}
+        for name, unit, signals in (
+            ("reference", "um", 1e6 * self.reference),
+            ("displacement", "um", 1e6 * self.y),
+            ("drive", "V", self.u),
+        ):
+            for k in range(signals.shape[1]):
+                columns[f"{name}_{k}_{unit}"] = signals[:, k]
+        return columns
+
+    def document(self) -> dict[str, Any]:
+        """Content of the JSON file.
+
+        Returns
+        -------
+        dict
+            Of numbers, texts, lists and dicts only.
+        """
+        return {
+            "format": "piezotrack-axes-run",
+            "schema_version": 1,
+            "dt_s": self.dt,
+            "note": self.note,
+            "stable": self.margins.stable,
+            "sensitivity": self.margins.sensitivity,
+            "complementary": self.margins.complementary,
+            "gain_margin": self.margins.gain_margin,
+            "phase_margin_deg": self.margins.phase_margin,
+            "rms_error_m": [one.rms_error for one in self.metrics],
+            "max_error_m": [one.max_error for one in self.metrics],
+            "cross_coupling": self.cross_coupling.tolist(),
+            "provenance": {"package": "piezotrack", "version": _core.__version__},
+        }
+
+    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write the motion to a folder, in one go.
+
+        Parameters
+        ----------
+        folder : path-like
+            It is made where it does not exist.
+
+        Returns
+        -------
+        list of pathlib.Path
+            ``axes_run.csv`` with the signals, ``axes_run.json``, ``axes_run.png`` and ``.svg``.
+
+        Raises
+        ------
+        DataError
+            The folder cannot be made or written to.
+        """
+        return write_result(folder, "axes_run", self.document(), self.plot(), self.table)
 
 
 def check_axes(

@@ -9,9 +9,10 @@ import numpy as np
 from ..._support.units import drive_text, shown_unit
 
 if TYPE_CHECKING:
+    from ..closed_loop import MultiAxisTracking
     from ..modal_model import AxesLevel, MultiAxisModel
 
-__all__ = ["model_text"]
+__all__ = ["axes_tracking_text", "model_text"]
 
 # Damping ratio from which a pole is a background of the band and no mode.
 BACKGROUND = 0.3
@@ -78,3 +79,14 @@ def _frequency_sd(model: MultiAxisModel, one: AxesLevel, k: int) -> float:
     slope = np.array([logarithm.real * logarithm.real, logarithm.imag]) / size
     sd = np.hypot(slope[0] * one.decay_sd[k], slope[1] * one.angle_sd[k])
     return float(sd / (2.0 * np.pi * model.dt))
+
+
+def axes_tracking_text(run: MultiAxisTracking) -> str:
+    """Write the loop, and the errors of each axis."""
+    lines = [f"{run.note}", "axis  max um  rms um  off its reference, of the largest stroke"]
+    for k, (figures, share) in enumerate(zip(run.metrics, run.cross_coupling, strict=True)):
+        lines.append(
+            f"{k:>4}  {1e6 * figures.max_error:>6.3f}  {1e6 * figures.rms_error:>6.3f}  "
+            f"{100 * share:.2f} %"
+        )
+    return "\n".join(lines)

@@ -156,9 +156,7 @@ impl ModalSystem {
             }
             let rows = self.outputs.each_ref().map(|part| &part[channel * count..][..count]);
             let gains = rows[0].iter().zip(rows[1]);
-            for ((real, imaginary), (x, y)) in
-                gains.zip(state.real.iter().zip(&state.imaginary))
-            {
+            for ((real, imaginary), (x, y)) in gains.zip(state.real.iter().zip(&state.imaginary)) {
                 sum += real * x + imaginary * y;
             }
             *slot = sum;

@@ -21,6 +21,12 @@ type Parts<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 type Simulated<'py> =
     (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
+/// Outputs and drives of a loop.
+type Tracked<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
+/// Reference, feedforward and noise of a loop.
+type Signals<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>);
+
 /// Gain, integral, derivative and tracking time.
 type Gains = (f64, f64, f64, Option<f64>);
 
@@ -69,8 +75,10 @@ impl PyModalSystem {
         state: Parts<'py>,
         drive: &Bound<'py, PyAny>,
     ) -> PyResult<Simulated<'py>> {
-        let mut state =
-            ModalState { real: samples("state", &state.0)?, imaginary: samples("state", &state.1)? };
+        let mut state = ModalState {
+            real: samples("state", &state.0)?,
+            imaginary: samples("state", &state.1)?,
+        };
         let drive = samples("drive", drive)?;
         let outputs = enter(py, |_| self.0.simulate(&mut state, &drive))?;
         Ok((
@@ -89,8 +97,8 @@ impl PyModalSystem {
         dt: f64,
         matrices: Parts<'py>,
         limits: Vec<[f64; 2]>,
-        signals: (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>),
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+        signals: Signals<'py>,
+    ) -> PyResult<Tracked<'py>> {
         let (to_drives, to_axes) =
             (samples("to_drives", &matrices.0)?, samples("to_axes", &matrices.1)?);
         let reference = samples("reference", &signals.0)?;
