@@ -74,11 +74,11 @@ class AxesMargins:
 
     @property
     def gain_margin(self) -> float:
-        """Factor by which gains may rise at least, from Ms and Mt."""
-        from_s = self.sensitivity / (self.sensitivity - 1.0) if self.sensitivity > 1.0 else np.inf
+        """Rise of gains that is allowed at least, from Ms and Mt [dB]."""
         if not self.stable:
-            return 1.0
-        return float(max(from_s, 1.0 + 1.0 / self.complementary))
+            return 0.0
+        from_s = self.sensitivity / (self.sensitivity - 1.0) if self.sensitivity > 1.0 else np.inf
+        return float(20.0 * np.log10(max(from_s, 1.0 + 1.0 / self.complementary)))
 
     @property
     def phase_margin(self) -> float:
@@ -93,7 +93,7 @@ class AxesMargins:
             return f"unstable: a pole of magnitude {self.radius:.4f}"
         return (
             f"stable, Ms {self.sensitivity:.2f} at {self.worst:.4g} Hz, Mt "
-            f"{self.complementary:.2f}: gain margin {self.gain_margin:.2f}, phase margin "
+            f"{self.complementary:.2f}: gain margin {self.gain_margin:.1f} dB, phase margin "
             f"{self.phase_margin:.0f} deg at least"
         )
 
@@ -179,7 +179,7 @@ class MultiAxisTracking(Result):
             "stable": self.margins.stable,
             "sensitivity": self.margins.sensitivity,
             "complementary": self.margins.complementary,
-            "gain_margin": self.margins.gain_margin,
+            "gain_margin_dB": self.margins.gain_margin,
             "phase_margin_deg": self.margins.phase_margin,
             "rms_error_m": [one.rms_error for one in self.metrics],
             "max_error_m": [one.max_error for one in self.metrics],
