@@ -184,7 +184,7 @@ def test_an_unstable_loop_says_so(stage: VirtualAxes) -> None:
         ({"feedback": [LAW, LAW]}, pt.ShapeError, "2 laws: expected 3"),
         ({"feedback": 1.0}, pt.ParameterError, "feedback is 1.0"),
         ({"reference": np.zeros((10, 2))}, pt.ShapeError, "samples x 3 axes"),
-        ({"limits": (1.0, 1.0)}, pt.ParameterError, "limits are 1 to 1 V"),
+        ({"limits": (1.0, 1.0)}, pt.ParameterError, r"limits are \(1, 1\) V"),
         ({"feedforward": np.zeros((3, 3))}, pt.ShapeError, "feedforward has the shape"),
         ({"feedforward": "dynamic"}, pt.ParameterError, "feedforward is 'dynamic'"),
         ({"stage": pt.DahlStage.xu_li_2010()}, pt.ParameterError, "a MultiAxisModel"),

@@ -10,7 +10,7 @@ import numpy as np
 from .._support.arguments import expect, in_range
 from ..errors import DataError
 from ..response.best_linear_approximation import spectra
-from .record import MultiAxisRecord, relative_error
+from .record import MultiAxisRecord, check_skip, relative_error
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -137,6 +137,8 @@ class MultiAxisResponse:
         ------
         DataError
             The record has another period or interval.
+        ParameterError
+            `skip` leaves nothing.
         """
         expect("record", record, MultiAxisRecord, "a MultiAxisRecord")
         if record.samples != self.samples or abs(record.dt - self.dt) > 1e-6 * self.dt:
@@ -144,6 +146,7 @@ class MultiAxisResponse:
                 f"the record has periods of {record.samples * record.dt:.6g} s: expected "
                 f"{self.samples * self.dt:.6g} s, as the response"
             )
+        check_skip(skip, record.samples)
         places = np.round(self.frequency * self.samples * self.dt).astype(np.intp)
         errors = []
         for r in range(record.realisations):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from .. import _core
-from .._support.arguments import expect, has_entries, not_negative, one_of
+from .._support.arguments import expect, has_entries, not_negative, number_pair, one_of
 from .._support.arrays import real_array
 from .._support.display.result import Result
 from .._support.files.writing import write_result
@@ -343,7 +343,7 @@ def track_axes(
     terms, laws, matrix = _parts(stage, feedback, decoupling, level, model)
     sensors, drives = terms.direct.shape
     wanted = reference_of(reference, sensors)
-    low, high = (-np.inf, np.inf) if limits is None else _limits(limits)
+    low, high = (-np.inf, np.inf) if limits is None else number_pair("limits", limits, "V")
     if isinstance(feedforward, str):
         one_of("feedforward", feedforward, FEEDFORWARDS)
         added = wanted @ matrix.T if feedforward == "static" else np.zeros((len(wanted), drives))
@@ -353,7 +353,7 @@ def track_axes(
             raise ShapeError("feedforward", f"the shape {added.shape}", f"{len(wanted)} x {drives}")
     if noise is None:
         noise = stage.noise if isinstance(stage, VirtualAxes) else 0.0
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(_core.as_count("seed", seed))
     scatter = not_negative("noise", noise, "m") * random.standard_normal(wanted.shape)
     if isinstance(stage, VirtualAxes) and stage.cubic != 0.0:
         raise ParameterError("stage", f"bent by {stage.cubic:g} 1/V^2", "one without cubic")
@@ -399,13 +399,6 @@ def _parts(
             f"{terms.direct.shape[1]} and {sensors}, as the stage",
         )  # fmt: skip
     return terms, laws, matrix
-
-
-def _limits(limits: tuple[float, float]) -> tuple[float, float]:
-    low, high = (float(one) for one in limits)
-    if not low < high:
-        raise ParameterError("limits", f"{low:g} to {high:g} V", "a range", verb="are")
-    return low, high
 
 
 def _closed(terms: ModalTerms, laws: list[Pid], matrix: Array, dt: float) -> Array:

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import not_negative, one_of, positive
+from .._support.arguments import expect, in_range, one_of, positive
 from .._support.arrays import real_array
 from ..errors import DataError, NumericalError, ShapeError
+from .modal_model import MultiAxisModel
 from .virtual import VirtualAxes
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from .modal_model import MultiAxisModel
     from .modal_terms import ModalTerms
 
     Array = NDArray[np.float64]
@@ -29,6 +29,7 @@ CONDITION = 1e8
 
 def terms_of(stage: MultiAxisModel | VirtualAxes, level: float | None) -> ModalTerms:
     """Return the modes of a model or of a stage whose modes are known."""
+    expect("model", stage, (MultiAxisModel, VirtualAxes), "a MultiAxisModel or a VirtualAxes")
     return stage.terms if isinstance(stage, VirtualAxes) else stage.at(level)
 
 
@@ -133,7 +134,7 @@ def repeating_drive(
     frequency = np.arange(count // 2 + 1) / (count * model.dt)
     response = terms.response(np.exp(2j * np.pi * frequency * model.dt))
     size = float(np.linalg.norm(response[0], 2))
-    small = not_negative("regularisation", regularisation, "") * size
+    small = in_range("regularisation", regularisation, 1e9, "gains at rest") * size
     spectrum = np.fft.rfft(wanted, axis=0)
     if highest is not None:
         spectrum[frequency > positive("highest", highest, "Hz")] = 0.0

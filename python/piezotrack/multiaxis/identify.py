@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from .._support.arguments import expect
+from .._support.arguments import expect, has_entries
+from .._support.messages import quoted
 from ..errors import DataError, ParameterError
 from .approximation import MultiAxisResponse, approximate_axes
 from .gauss_newton import Target, pole_deviations, refine
@@ -89,6 +90,8 @@ def identify_axes(
     """
     if isinstance(records, MultiAxisRecord):
         records = [records]
+    if not has_entries(records):
+        raise ParameterError("records", quoted(records), "a MultiAxisRecord or a list of them")
     records = list(records)
     if not records:
         raise ParameterError("records", "an empty list", "a record or more")

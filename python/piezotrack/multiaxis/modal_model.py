@@ -12,8 +12,9 @@ from .._support.arguments import expect, one_of, positive
 from .._support.arrays import real_array
 from .._support.display.result import Result
 from .._support.files.writing import write_result
+from .._support.messages import quoted
 from ..errors import DataError, ParameterError, ShapeError
-from .record import MultiAxisRecord, relative_error
+from .record import MultiAxisRecord, check_skip, relative_error
 
 if TYPE_CHECKING:
     import os
@@ -182,8 +183,10 @@ class MultiAxisModel(Result):
         ndarray of complex, shape (k, sensors, drives)
             Responses [m/V].
         """
-        points = np.exp(2j * np.pi * real_array("frequency", frequency) * self.dt)
-        return self.at(level).response(np.atleast_1d(points))
+        frequencies = np.atleast_1d(real_array("frequency", frequency))
+        if frequencies.ndim != 1 or not (np.abs(frequencies) < _core.LARGEST).all():
+            raise ParameterError("frequency", quoted(frequency), "a row of frequencies")
+        return self.at(level).response(np.exp(2j * np.pi * frequencies * self.dt))
 
     def static_gain(self, *, level: float | None = None) -> Array:
         """Return the responses at rest, beyond the lowest line extrapolated.
@@ -250,9 +253,10 @@ class MultiAxisModel(Result):
             place = tuple(int(k) for k in np.argwhere(~np.isfinite(drive))[0])
             raise DataError(f"u{list(place)} is {drive[place]}: expected finite numbers only")
         if level is None:
-            level = level_of(drive)
-        lower, upper, share = self._place(level or None)
-        terms = self.at(level or None)
+            # Drives that stand still have no level.
+            level = level_of(drive) or None
+        lower, upper, share = self._place(level)
+        terms = self.at(level)
         about = (1.0 - share) * lower.drive_mean + share * upper.drive_mean
         offset = (1.0 - share) * lower.output_mean + share * upper.output_mean
         moved = np.ascontiguousarray(drive - about)
@@ -262,7 +266,12 @@ class MultiAxisModel(Result):
             if start == "periodic":
                 state = terms.steady(moved)
         else:
-            state = np.asarray(start, dtype=np.complex128)
+            try:
+                state = np.asarray(start, dtype=np.complex128)
+            except (TypeError, ValueError, OverflowError):
+                raise ParameterError(
+                    "start", quoted(start), "'rest', 'periodic' or a state"
+                ) from None
             if state.shape != terms.poles.shape:
                 raise ShapeError("start", f"the shape {state.shape}", f"{terms.poles.size} modes")
         y, last = terms.simulate(moved, state)
@@ -297,9 +306,7 @@ class MultiAxisModel(Result):
         expect("record", record, MultiAxisRecord, "a MultiAxisRecord")
         one_of("start", start, STARTS)
         self._check_fits(record)
-        skip = _core.as_count("skip", skip)
-        if skip >= record.samples:
-            raise ParameterError("skip", skip, f"below {record.samples}, the samples of a period")
+        check_skip(skip, record.samples)
         found = []
         for r in range(record.realisations):
             u, y = (np.moveaxis(one[:, :, r], 2, 0) for one in (record.u, record.y))

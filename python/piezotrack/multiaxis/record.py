@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from .. import _core
-from .._support.arguments import expect
+from .._support.arguments import expect, has_entries
 from .._support.arrays import MOST_SAMPLES, check_dt, unmasked
 from .._support.messages import quoted
 from .._support.units import drive_text
 from ..errors import DataError, ParameterError, ShapeError
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
-__all__ = ["MultiAxisRecord", "relative_error"]
+__all__ = ["MultiAxisRecord", "check_same", "check_skip", "relative_error"]
 
 SHAPE = "samples x channels, samples x channels x realisations, or the same x periods"
 
@@ -150,6 +150,8 @@ class MultiAxisRecord:
         ParameterError
             There is none, or their intervals or units differ.
         """
+        if not has_entries(records):
+            raise ParameterError("records", quoted(records), "a list of MultiAxisRecord")
         records = list(records)
         if not records:
             raise ParameterError("records", "an empty list", "a record or more")
@@ -203,6 +205,7 @@ class MultiAxisRecord:
         DataError
             The file is missing, or is none of NumPy, or has no such array.
         """
+        expect("path", path, (str, os.PathLike), "the name of a file")
         try:
             with np.load(path, allow_pickle=False) as arrays:
                 missing = [name for name in (drive, output) if name not in arrays.files]
@@ -265,6 +268,8 @@ class MultiAxisRecord:
         ParameterError
             There is none, or a place is beyond the last.
         """
+        if not has_entries(realisations):
+            raise ParameterError("realisations", quoted(realisations), "a list of places")
         places = [_core.as_count("realisations", one) for one in realisations]
         if not places or max(places) >= self.realisations:
             raise ParameterError(
@@ -313,6 +318,12 @@ def check_same(first: MultiAxisRecord, other: MultiAxisRecord, k: int) -> None:
             f"{first.drive_unit} and {first.output_unit}, as record 0",
             verb="have",
         )
+
+
+def check_skip(skip: int, samples: int) -> None:
+    """Refuse a number of samples left out that leaves none of a period."""
+    if _core.as_count("skip", skip) >= samples:
+        raise ParameterError("skip", skip, f"below {samples}, the samples of a period")
 
 
 def relative_error(measured: Array, simulated: Array, skip: int) -> float:

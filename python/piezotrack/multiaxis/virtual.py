@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _core
-from .._support.arguments import finite, not_negative, numbers, positive
+from .._support.arguments import finite, in_range, not_negative, numbers
 from .._support.arrays import check_dt, real_array
-from ..errors import ParameterError, ShapeError
+from ..errors import DataError, ParameterError, ShapeError
 from .modal_terms import ModalTerms
 from .record import MultiAxisRecord
 
@@ -22,6 +22,8 @@ __all__ = ["VirtualAxes"]
 
 # Share of half the sampling rate that the multisines of a record fill.
 FILLED = 0.88
+# Largest drive [V], whose cube is a number.
+LARGEST = 1e6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -205,7 +207,9 @@ class VirtualAxes:
         ParameterError
             An argument is out of its range.
         """
-        level = positive("level", level, "V")
+        level = in_range("level", level, LARGEST, "V")
+        if level == 0.0:
+            raise ParameterError("level", "0 V", "a level above 0 V")
         counts = {"realisations": realisations, "periods": periods, "samples": samples}
         for name, least in (("realisations", 1), ("periods", 1), ("samples", 16)):
             if _core.as_count(name, counts[name]) < least:
@@ -244,7 +248,20 @@ class VirtualAxes:
         -------
         ndarray, shape (samples, sensors)
             Displacements [m].
+
+        Raises
+        ------
+        ShapeError
+            The drives have another number of channels.
+        DataError
+            A drive is not finite, or beyond 1 MV.
         """
-        drive = np.ascontiguousarray(u + self.cubic * u**3)
+        given = real_array("u", u)
+        drives = self.terms.direct.shape[1]
+        if given.ndim != 2 or given.shape[1] != drives or not len(given):
+            raise ShapeError("u", f"the shape {given.shape}", f"samples x {drives} drives")
+        if not np.abs(given).max() <= LARGEST:
+            raise DataError(f"u: expected finite numbers up to {LARGEST:g} V")
+        drive = np.ascontiguousarray(given + self.cubic * given**3)
         rest = np.zeros(self.terms.poles.size, dtype=np.complex128)
         return self.terms.simulate(drive, self.terms.steady(drive) if periodic else rest)[0]
