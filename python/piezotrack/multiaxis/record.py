@@ -370,11 +370,11 @@ def _signals(name: str, values: ArrayLike, periods: int | None) -> Array:
         raise DataError(f"{name}{list(place)} is {array[place]}: expected finite numbers only")
     if array.ndim == 2:
         array = array[:, :, np.newaxis]
+    count = 1 if periods is None else _core.as_count("periods", periods)
     if array.ndim == 4:
-        if periods is not None and periods != array.shape[3]:
+        if periods is not None and count != array.shape[3]:
             raise ParameterError("periods", periods, f"{array.shape[3]}, as {name} has, or none")
         return array
-    count = 1 if periods is None else _core.as_count("periods", periods)
     if count < 1 or array.shape[0] % count:
         raise ParameterError(
             "periods", periods, f"a number of which {array.shape[0]} samples are whole periods"
