@@ -1,8 +1,9 @@
 """Draw the pictures of the pages that no example draws: what the code of the pages plots.
 
 Run as ``make pictures``, or ``python docs/make_pictures.py``: band.png, profiles.png,
-suggested.png, identified.png, response.png and verified.png beside this file. The others are drawn
-by scripts in python/examples and benches, and by ``piezotrack demo`` and ``make benchmark``.
+suggested.png, identified.png, response.png, verified.png and several_axes.png beside this file.
+The others are drawn by scripts in python/examples and benches, and by ``piezotrack demo`` and
+``make benchmark``.
 """
 
 from __future__ import annotations
@@ -70,6 +71,14 @@ def responded() -> None:
     found.plot().savefig(DOCS / "verified.png")
 
 
+def several_axes() -> None:
+    """Draw the responses of three axes at two levels, and the modes that were found in them."""
+    axes = pt.multiaxis
+    stage = axes.VirtualAxes.three(cubic=0.04, noise=2e-9, seed=1)
+    records = [stage.record(realisations=9, level=level) for level in (0.5, 1.5)]
+    axes.identify_axes(records).plot().savefig(DOCS / "several_axes.png")
+
+
 if __name__ == "__main__":
-    for draw in (band, profiles, suggested, identified, responded):
+    for draw in (band, profiles, suggested, identified, responded, several_axes):
         draw()

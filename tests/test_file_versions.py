@@ -15,6 +15,7 @@ from piezotrack.control.controller import controller
 from piezotrack.errors import DataError
 from piezotrack.identification.campaigns import folder
 from piezotrack.identification.fitted import model_entries
+from piezotrack.multiaxis import modal_model
 from piezotrack.response import response_data
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ CURRENT = {
     model_entries.FORMAT: model_entries.SCHEMA_VERSION,
     controller.FORMAT: controller.SCHEMA_VERSION,
     response_data.FORMAT: response_data.SCHEMA_VERSION,
+    modal_model.FORMAT: modal_model.SCHEMA_VERSION,
     folder.FORMAT: folder.SCHEMA_VERSION,
 }
 # No version before was released, and none is read.
@@ -79,6 +81,14 @@ def test_a_response_has_its_gain() -> None:
     assert last == pytest.approx((1.0 - 0.05**2) / (1.0 - 0.45**2), rel=0.02)
 
 
+def test_axes_have_their_modes() -> None:
+    model = pt.multiaxis.load_axes(FILES / "axes_version_1.json")
+    assert [one.level for one in model.levels] == pytest.approx([0.5, 1.0])
+    assert model.frequencies() == pytest.approx([180.0, 231.0, 262.0, 540.0, 720.0], rel=1e-4)
+    # A push of the first drive at rest: 2.2 um/V at its own sensor, a quarter of it at the next.
+    assert model.static_gain()[:2, 0] == pytest.approx([2.225e-6, 0.63e-6], rel=1e-3)
+
+
 def test_a_campaign_has_its_results() -> None:
     found = pt.identification.Campaign.load(FILES / "campaign_version_2")
     (result,) = found
@@ -92,6 +102,7 @@ def test_a_campaign_has_its_results() -> None:
         ("prandtl_ishlinskii_version_2", pt.load),
         ("controller_version_1", pt.load_controller),
         ("response_version_1", pt.load_response),
+        ("axes_version_1", pt.multiaxis.load_axes),
     ],
 )
 def test_a_file_of_a_later_version_is_refused(name: str, read: Any, tmp_path: Path) -> None:

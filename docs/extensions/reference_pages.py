@@ -34,6 +34,7 @@ ROOMS = (
     "hardware",
     "response",
     "control",
+    "multiaxis",
     "xu_li_2010",
 )
 

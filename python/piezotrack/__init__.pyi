@@ -5,6 +5,7 @@ from . import control as control
 from . import data as data
 from . import hardware as hardware
 from . import identification as identification
+from . import multiaxis as multiaxis
 from . import references as references
 from . import response as response
 from . import stages as stages

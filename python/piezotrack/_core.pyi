@@ -20,6 +20,7 @@ __all__ = [
     "LeastSquaresFit",
     "LocalFit",
     "LoopPlant",
+    "ModalSystem",
     "Objective",
     "PathTask",
     "Response",
@@ -518,6 +519,31 @@ class XYStage:
         timings: tuple[_Timing, _Timing],
         substeps: int,
     ) -> tuple[TrackingRun, TrackingRun]: ...
+
+_Parts = tuple[ArrayLike, ArrayLike]
+
+@final
+class ModalSystem:
+    def __new__(
+        cls,
+        drives: int,
+        sensors: int,
+        poles: _Parts,
+        inputs: _Parts,
+        outputs: _Parts,
+        direct: ArrayLike,
+    ) -> ModalSystem: ...
+    def simulate(
+        self, state: _Parts, drive: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+    def track(
+        self,
+        gains: Sequence[tuple[float, float, float, float | None]],
+        dt: float,
+        matrices: _Parts,
+        limits: Sequence[tuple[float, float]],
+        signals: tuple[ArrayLike, ArrayLike, ArrayLike],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 
 def circle_errors(
     x: ArrayLike, y: ArrayLike, centre: tuple[float, float], radius: float

@@ -91,6 +91,20 @@ def measured_response() -> pt.FrequencyResponse:
     return pt.frequency_response(plays(), lines, rate=2000.0)
 
 
+def axes_model() -> pt.multiaxis.MultiAxisModel:
+    axes = pt.multiaxis.VirtualAxes.three(cubic=0.04, noise=2e-9, seed=1)
+    return pt.multiaxis.identify_axes(
+        [axes.record(samples=256, level=level) for level in (0.5, 1.5)]
+    )
+
+
+def axes_run() -> pt.multiaxis.MultiAxisTracking:
+    wanted = np.zeros((400, 3))
+    wanted[50:, 0] = UM
+    axes = pt.multiaxis.VirtualAxes.three()
+    return pt.multiaxis.track_axes(axes, wanted, pt.Pid(kp=0.005, ti=5e-4))
+
+
 def verified() -> pt.control.Verification:
     lines = pt.RandomPhaseMultisine(band=(5.0, 400.0), low=-1.0, high=1.0)
     law = pt.Pid(kp=5e3, ti=5e-5, td=0.02)
@@ -171,6 +185,8 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Dataset": log,
     "DeviceTracking": on_device,
     "FrequencyResponse": measured_response,
+    "MultiAxisModel": axes_model,
+    "MultiAxisTracking": axes_run,
     "Health": lambda: pt.watch(model_watched(), watched(31)),
     "Identification": searched,
     "Identification, plays": fit,

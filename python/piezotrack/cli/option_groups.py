@@ -114,7 +114,7 @@ class LogOptions(Columns):
         "foh"
     )
     resample: Annotated[
-        float | None, Option("Interpolate to this interval, for gaps or jitter; default not", TIME)
+        float | None, Option("Interpolate to this interval, over gaps; default not", TIME)
     ] = None
     decimate: Annotated[
         str | None,

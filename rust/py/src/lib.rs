@@ -32,5 +32,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     stages::virtual_stage::register(module)?;
     control::tracking::register(module)?;
     tune::register(module)?;
-    stages::xy::register(module)
+    stages::xy::register(module)?;
+    stages::modal_system::register(module)
 }

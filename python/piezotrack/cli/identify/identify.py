@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from ..._support.display.progress_parts import Parts
 from ...errors import Interrupted, ParameterError
-from ..command import Option, command
+from ..command import Option, command, refuse_without_effect
 from ..option_groups import LogOptions
 from ..options import TestLog, TestWindow, Threads, Windows, command_line, cut, of_file
 from ..output import Output
 from ..process.interruption import acknowledge_interrupt
+from ..values import TIME
 from .fit_options import (
     AUTO,
     FitOptions,
@@ -27,6 +28,7 @@ from .fit_options import (
     each_of,
     searched,
 )
+from .several_axes import identify_several, is_several
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,13 +64,18 @@ def identify_command(
         Path | None,
         Option("File of simulations, to continue after an interruption", metavar="FILE"),
     ] = None,
+    period: Annotated[float | None, Option("Time after which an axis repeats", TIME)] = None,
     parameters: ParameterOptions,
     report: Annotated[
         Path | None, Option("Report for other readers, .html or .pdf", metavar="FILE")
     ] = None,
     output: Output,
 ) -> None:
-    """Identify models of a stage from one log or several."""
+    """Identify models of a stage, or of axes (--drive a,b), from logs."""
+    if is_several(reading):
+        identify_several(files, reading, period, output)
+        return
+    refuse_without_effect(["period"], "with one axis")
     from ...identification.comparison.validation import validated
     from ...identification.fitted.score import share_fitted
     from ...identification.views.report_page.page import write_report

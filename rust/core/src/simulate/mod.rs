@@ -7,6 +7,7 @@
 mod amplifier;
 mod apparatus;
 mod closed_loop;
+mod modal_system;
 mod open_loop;
 mod sensor;
 mod sensor_delay;
@@ -19,6 +20,7 @@ mod virtual_stage;
 pub use amplifier::{Amplifier, AmplifierFlow};
 pub use apparatus::{Apparatus, ApparatusState};
 pub use closed_loop::{ClosedLoop, closed_loop};
+pub use modal_system::{AxesLoop, AxesRun, ModalState, ModalSystem};
 pub use open_loop::{OpenLoop, open_loop};
 pub use sensor::{Sensor, SensorState};
 pub use timing::{MissedTicks, Timing};

@@ -1,6 +1,7 @@
-//! Models, stages, their inverses, and virtual stages on one axis and two.
+//! Models, stages, their inverses, and virtual stages on one axis, two and several.
 
 pub mod inverse;
+pub mod modal_system;
 pub mod models;
 pub mod stage;
 pub mod virtual_stage;

@@ -1,0 +1,19 @@
+# The public names and their homes, each written once: type checkers read them here, and
+# _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
+from .approximation import MultiAxisResponse as MultiAxisResponse
+from .approximation import approximate_axes as approximate_axes
+from .closed_loop import AxesMargins as AxesMargins
+from .closed_loop import MultiAxisTracking as MultiAxisTracking
+from .closed_loop import check_axes as check_axes
+from .closed_loop import track_axes as track_axes
+from .decoupling import decoupling_matrix as decoupling_matrix
+from .decoupling import repeating_drive as repeating_drive
+from .identify import identify_axes as identify_axes
+from .modal_model import AxesLevel as AxesLevel
+from .modal_model import MultiAxisModel as MultiAxisModel
+from .modal_model import MultiAxisMotion as MultiAxisMotion
+from .modal_terms import ModalTerms as ModalTerms
+from .model_file import load_axes as load_axes
+from .reading import read_axes as read_axes
+from .record import MultiAxisRecord as MultiAxisRecord
+from .virtual import VirtualAxes as VirtualAxes

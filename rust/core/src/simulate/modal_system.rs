@@ -1,0 +1,297 @@
+//! Modes in parallel with several drives and sensors, from sample to sample, alone or in a loop.
+
+use piezotrack_control::{Feedback, FeedbackSample};
+
+use crate::error::{Error, Result};
+use crate::math::{room, zeros};
+
+/// A sampled system of n drives and m sensors whose modes stand in parallel.
+///
+/// ```text
+/// x_i[k+1] = p_i x_i[k] + b_i . u[k]
+/// y[k]     = 2 Re sum_i c_i x_i[k] + D u[k]
+/// ```
+///
+/// Each mode is a complex pole p with the vectors b (of the drives) and c (of the sensors); its
+/// conjugate is the factor 2 Re. A pole on the real axis is a first-order lag.
+///
+/// ```
+/// use piezotrack_core::simulate::ModalSystem;
+///
+/// // 2 Re 0.5/(z - 0.5): a lag with a static gain of 2.
+/// let lag = ModalSystem::new([1, 1], &[[0.5, 0.0]], &[[1.0, 0.0]], &[[0.5, 0.0]], &[0.0])?;
+/// let mut state = lag.rest()?;
+/// assert_eq!(lag.simulate(&mut state, &[1.0, 1.0, 1.0])?, [0.0, 1.0, 1.5]);
+/// # Ok::<(), piezotrack_core::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModalSystem {
+    drives: usize,
+    sensors: usize,
+    /// Real and imaginary parts of the poles.
+    poles: [Vec<f64>; 2],
+    /// Real and imaginary parts of b, drive by drive.
+    inputs: [Vec<f64>; 2],
+    /// Real and negative imaginary parts of 2 c, sensor by sensor.
+    outputs: [Vec<f64>; 2],
+    /// D, sensor by sensor.
+    direct: Vec<f64>,
+}
+
+/// State of a [`ModalSystem`]: real and imaginary parts of its modes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModalState {
+    /// Real parts.
+    pub real: Vec<f64>,
+    /// Imaginary parts.
+    pub imaginary: Vec<f64>,
+}
+
+/// A loop around a [`ModalSystem`]: one law for each sensor, and matrices between axes and drives.
+///
+/// A command is computed from a reading and put out one sample later.
+#[derive(Clone, Debug)]
+pub struct AxesLoop<F> {
+    /// The law of each axis.
+    pub laws: Vec<F>,
+    /// From the outputs of the laws to the drives, drive by drive.
+    pub to_drives: Vec<f64>,
+    /// From the drives to the outputs of the laws, axis by axis, for antiwindup.
+    pub to_axes: Vec<f64>,
+    /// Least and largest value of each drive.
+    pub limits: Vec<[f64; 2]>,
+}
+
+/// What a loop did: readings without noise, and drives, sample by sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxesRun {
+    /// Displacements, all sensors of a sample after each other.
+    pub outputs: Vec<f64>,
+    /// Drives within their limits, all of a sample after each other.
+    pub drives: Vec<f64>,
+}
+
+/// Refuses a list that has not as many entries as expected.
+fn sized(name: &str, found: usize, expected: usize) -> Result<()> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(Error::Shape {
+        name: name.into(),
+        found: format!("{found} entries"),
+        expected: format!("{expected}"),
+    })
+}
+
+impl ModalSystem {
+    /// A system of `[drives, sensors]` with these poles, b of each mode, c of each mode, and D
+    /// sensor by sensor; complex numbers as real and imaginary part.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where the lists do not fit each other; [`Error::Parameter`] where a pole is
+    /// not inside the unit circle or a number is not finite; [`Error::Memory`].
+    pub fn new(
+        [drives, sensors]: [usize; 2],
+        poles: &[[f64; 2]],
+        inputs: &[[f64; 2]],
+        outputs: &[[f64; 2]],
+        direct: &[f64],
+    ) -> Result<Self> {
+        let count = poles.len();
+        sized("inputs", inputs.len(), count.saturating_mul(drives))?;
+        sized("outputs", outputs.len(), count.saturating_mul(sensors))?;
+        sized("direct", direct.len(), sensors.saturating_mul(drives))?;
+        for [real, imaginary] in poles {
+            let size = real * real + imaginary * imaginary;
+            if size.is_nan() || size >= 1.0 {
+                let value = format!("{real} + {imaginary}i");
+                return Err(Error::parameter("poles", value, "poles inside the unit circle"));
+            }
+        }
+        let all = inputs.iter().chain(outputs).flatten().chain(direct);
+        if let Some(value) = all.into_iter().find(|value| !value.is_finite()) {
+            return Err(Error::parameter("inputs, outputs or direct", value, "finite numbers"));
+        }
+        // Mode after mode in memory, for each drive and sensor.
+        let turned = |entries: &[[f64; 2]], width: usize, part: usize, factor: f64| {
+            let mut found = room("the modes", entries.len())?;
+            for channel in 0..width {
+                let column = entries.iter().skip(channel).step_by(width);
+                found.extend(column.map(|entry| factor * entry[part]));
+            }
+            Ok::<Vec<f64>, Error>(found)
+        };
+        Ok(Self {
+            drives,
+            sensors,
+            poles: [turned(poles, 1, 0, 1.0)?, turned(poles, 1, 1, 1.0)?],
+            inputs: [turned(inputs, drives, 0, 1.0)?, turned(inputs, drives, 1, 1.0)?],
+            outputs: [turned(outputs, sensors, 0, 2.0)?, turned(outputs, sensors, 1, -2.0)?],
+            direct: direct.to_vec(),
+        })
+    }
+
+    /// Number of modes.
+    #[must_use]
+    pub fn modes(&self) -> usize {
+        self.poles[0].len()
+    }
+
+    /// The state at rest.
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn rest(&self) -> Result<ModalState> {
+        let count = self.modes();
+        Ok(ModalState { real: zeros("the state", count)?, imaginary: zeros("the state", count)? })
+    }
+
+    /// Adds the output of a state under a drive to `output`, which has an entry for each sensor.
+    fn output(&self, state: &ModalState, drive: &[f64], output: &mut [f64]) {
+        let count = self.modes();
+        for (channel, slot) in output.iter_mut().enumerate() {
+            let mut sum = 0.0;
+            for (gain, value) in self.direct[channel * self.drives..].iter().zip(drive) {
+                sum += gain * value;
+            }
+            let rows = self.outputs.each_ref().map(|part| &part[channel * count..][..count]);
+            let gains = rows[0].iter().zip(rows[1]);
+            for ((real, imaginary), (x, y)) in gains.zip(state.real.iter().zip(&state.imaginary)) {
+                sum += real * x + imaginary * y;
+            }
+            *slot = sum;
+        }
+    }
+
+    /// Advances a state by one sample under a drive, which has an entry for each channel.
+    fn advance(&self, state: &mut ModalState, drive: &[f64]) {
+        let count = self.modes();
+        let poles = self.poles[0].iter().zip(&self.poles[1]);
+        for ((p, q), (x, y)) in poles.zip(state.real.iter_mut().zip(&mut state.imaginary)) {
+            let real = p * *x - q * *y;
+            *y = q * *x + p * *y;
+            *x = real;
+        }
+        for (channel, value) in drive.iter().enumerate() {
+            let rows = self.inputs.each_ref().map(|part| &part[channel * count..][..count]);
+            for (x, b) in state.real.iter_mut().zip(rows[0]) {
+                *x += b * value;
+            }
+            for (y, b) in state.imaginary.iter_mut().zip(rows[1]) {
+                *y += b * value;
+            }
+        }
+    }
+
+    /// Simulates a drive from a state, which becomes the state after it.
+    ///
+    /// All channels of a sample stand after each other, in the drive and in the outputs.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where the drive holds no whole number of samples or the state has another
+    /// number of modes; [`Error::Numerical`] where the output overflows; [`Error::Memory`].
+    pub fn simulate(&self, state: &mut ModalState, drive: &[f64]) -> Result<Vec<f64>> {
+        let count = self.checked(state, "drive", drive.len(), self.drives)?;
+        let mut outputs = zeros("the outputs", count * self.sensors)?;
+        let samples = drive.chunks_exact(self.drives);
+        for (slots, sample) in outputs.chunks_exact_mut(self.sensors).zip(samples) {
+            self.output(state, sample, slots);
+            self.advance(state, sample);
+        }
+        finite_outputs(outputs)
+    }
+
+    /// Closes a loop from rest along a reference, with noise of the sensors and a feedforward.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] where sizes do not fit each other; [`Error::Numerical`] where a signal
+    /// overflows; [`Error::Memory`].
+    pub fn track<F: Feedback>(
+        &self,
+        around: &AxesLoop<F>,
+        reference: &[f64],
+        feedforward: &[f64],
+        noise: &[f64],
+    ) -> Result<AxesRun> {
+        let (n, m) = (self.drives, self.sensors);
+        let mut state = self.rest()?;
+        let count = self.checked(&state, "reference", reference.len(), m)?;
+        sized("laws", around.laws.len(), m)?;
+        sized("to_drives", around.to_drives.len(), n * m)?;
+        sized("to_axes", around.to_axes.len(), n * m)?;
+        sized("limits", around.limits.len(), n)?;
+        sized("feedforward", feedforward.len(), count * n)?;
+        sized("noise", noise.len(), count * m)?;
+        let mut memories = room("the laws", m)?;
+        memories.extend(around.laws.iter().map(Feedback::rest));
+        let (mut outputs, mut drives) =
+            (zeros("the outputs", count * m)?, zeros("the drives", count * n)?);
+        let mut next = zeros("the command", n)?;
+        clip(&mut next, feedforward, &around.limits);
+        let (mut wanted, mut excess) = (zeros("the command", m)?, zeros("the excess", m)?);
+        let mut raw = zeros("the command", n)?;
+        for k in 0..count {
+            let drive = &mut drives[k * n..][..n];
+            drive.copy_from_slice(&next);
+            let output = &mut outputs[k * m..][..m];
+            self.output(&state, drive, output);
+            self.advance(&mut state, drive);
+            for (axis, law) in around.laws.iter().enumerate() {
+                let measured = output[axis] + noise[k * m + axis];
+                let reference = reference[k * m + axis];
+                let sample = FeedbackSample {
+                    error: reference - measured,
+                    reference,
+                    measured,
+                    excess: excess[axis],
+                    ..FeedbackSample::default()
+                };
+                wanted[axis] = law.step(&mut memories[axis], &sample);
+            }
+            let later = &feedforward[(k + 1).min(count - 1) * n..][..n];
+            for (channel, slot) in raw.iter_mut().enumerate() {
+                let row = around.to_drives[channel * m..][..m].iter().zip(&wanted);
+                *slot = later[channel] + row.map(|(gain, value)| gain * value).sum::<f64>();
+            }
+            clip(&mut next, &raw, &around.limits);
+            for (axis, slot) in excess.iter_mut().enumerate() {
+                let row = around.to_axes[axis * n..][..n].iter().zip(next.iter().zip(&raw));
+                *slot = row.map(|(gain, (clipped, raw))| gain * (clipped - raw)).sum::<f64>();
+            }
+        }
+        Ok(AxesRun { outputs: finite_outputs(outputs)?, drives })
+    }
+
+    /// The number of samples of a signal with some channels, where all sizes fit.
+    fn checked(
+        &self,
+        state: &ModalState,
+        name: &str,
+        entries: usize,
+        channels: usize,
+    ) -> Result<usize> {
+        sized("state", state.real.len(), self.modes())?;
+        sized("state", state.imaginary.len(), self.modes())?;
+        if channels == 0 || entries == 0 || !entries.is_multiple_of(channels) {
+            let found = format!("{entries} entries");
+            let expected = format!("whole samples of {channels} channels, one or more");
+            return Err(Error::Shape { name: name.into(), found, expected });
+        }
+        Ok(entries / channels)
+    }
+}
+
+/// Writes values within limits to `target`.
+fn clip(target: &mut [f64], values: &[f64], limits: &[[f64; 2]]) {
+    for ((slot, value), [low, high]) in target.iter_mut().zip(values).zip(limits) {
+        *slot = value.max(*low).min(*high);
+    }
+}
+
+/// The outputs, where they are finite.
+fn finite_outputs(outputs: Vec<f64>) -> Result<Vec<f64>> {
+    if outputs.iter().all(|value| value.is_finite()) {
+        return Ok(outputs);
+    }
+    Err(Error::Numerical("the simulated output leaves the range of numbers".into()))
+}

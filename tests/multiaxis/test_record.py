@@ -1,0 +1,100 @@
+"""Records of several axes: what is refused, and in which words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from piezotrack.multiaxis import MultiAxisRecord
+
+NOISE = np.random.default_rng(3).normal(size=(64, 3, 4, 2))
+
+
+def record(**changed: Any) -> MultiAxisRecord:
+    return MultiAxisRecord(**{"u": NOISE, "y": 1e-6 * NOISE, "dt": 1e-3, **changed})
+
+
+def holed(value: float) -> np.ndarray:
+    y = NOISE.copy()
+    y[7, 1, 0, 1] = value
+    return y
+
+
+@pytest.mark.parametrize(
+    ("changed", "error", "words"),
+    [
+        ({"y": NOISE[:60]}, pt.ShapeError, "y has 60 samples: expected 64"),
+        ({"y": NOISE[:, :, :3]}, pt.ShapeError, "y has 3 realisations: expected 4"),
+        ({"y": NOISE[..., :1]}, pt.ShapeError, "y has 1 periods: expected 2"),
+        ({"u": NOISE[:, 0, 0, 0]}, pt.ShapeError, "u has 1 dimensions"),
+        ({"y": holed(np.nan)}, pt.DataError, r"y\[7, 1, 0, 1\] is nan: expected finite"),
+        ({"u": 0.0 * NOISE}, pt.DataError, "drive 0 of u .* does not move"),
+        ({"dt": 0.0}, pt.ParameterError, "dt is 0.0"),
+        ({"periods": 3}, pt.ParameterError, "periods is 3: expected 2"),
+        ({"u": [[1.0, 2.0], [3.0]]}, pt.ShapeError, "u has rows of unequal lengths"),
+        ({"u": "ramp"}, pt.ShapeError, "u is 'ramp'"),
+    ],
+)
+def test_a_record_that_does_not_fit_is_refused_in_one_sentence(
+    changed: dict[str, Any], error: type[Exception], words: str
+) -> None:
+    with pytest.raises(error, match=words) as caught:
+        record(**changed)
+    assert "\n" not in str(caught.value)
+
+
+def test_one_realisation_for_three_drives_is_refused() -> None:
+    one = record(u=NOISE[:, :, :1], y=NOISE[:, :, :1])
+    words = "1 realisation for 3 drives: expected 3 or more"
+    for ask in (pt.multiaxis.approximate_axes, pt.multiaxis.identify_axes):
+        with pytest.raises(pt.DataError, match=words):
+            ask(one)
+
+
+def test_realisations_that_repeat_each_other_are_refused() -> None:
+    same = np.repeat(NOISE[:, :, :1, :1], 4, axis=2)
+    with pytest.raises(pt.DataError, match="depend on each other"):
+        pt.multiaxis.approximate_axes(record(u=same, y=same))
+
+
+def test_drives_that_do_not_repeat_are_refused() -> None:
+    with pytest.raises(pt.DataError, match=r"periods of the drives differ by .* % of their rms"):
+        pt.multiaxis.approximate_axes(record())
+
+
+def test_records_of_other_axes_or_of_one_level_are_refused() -> None:
+    stage = pt.multiaxis.VirtualAxes.three(noise=1e-9)
+    records = [stage.record(samples=256, level=level) for level in (1.0, 1.001)]
+    with pytest.raises(pt.ParameterError, match="distinct levels"):
+        pt.multiaxis.identify_axes(records, states=10)
+    fewer = MultiAxisRecord(u=records[1].u[:, :2], y=2.0 * records[1].y, dt=records[1].dt)
+    with pytest.raises(pt.ShapeError, match="2 drives in record 1: expected 3"):
+        pt.multiaxis.identify_axes([records[0], fewer], states=10)
+
+
+def test_periods_in_one_row_are_split() -> None:
+    flat = np.concatenate([NOISE[..., 0], NOISE[..., 1]])
+    split = record(u=flat, y=1e-6 * flat, periods=2)
+    assert np.array_equal(split.u, NOISE)
+    assert np.array_equal(split.y, 1e-6 * NOISE)
+
+
+def test_records_are_joined_as_realisations() -> None:
+    parts = [record().only([k]) for k in range(4)]
+    assert np.array_equal(MultiAxisRecord.joined(parts).y, record().y)
+    with pytest.raises(pt.ShapeError, match="record 1 has 32 samples"):
+        MultiAxisRecord.joined([record(), record(u=NOISE[:32], y=NOISE[:32])])
+
+
+def test_a_file_of_arrays_is_read_in_um(tmp_path: Any) -> None:
+    path = tmp_path / "axes.npz"
+    np.savez(path, u_1=NOISE, y_1=NOISE)
+    read = MultiAxisRecord.from_npz(path, drive="u_1", output="y_1", dt=1e-3)
+    assert np.array_equal(read.y, 1e-6 * NOISE)
+    with pytest.raises(pt.DataError, match="has no array 'y_2': expected one of u_1, y_1"):
+        MultiAxisRecord.from_npz(path, drive="u_1", output="y_2", dt=1e-3)
+    with pytest.raises(pt.DataError, match="cannot be read"):
+        MultiAxisRecord.from_npz(tmp_path / "none.npz", drive="u", output="y", dt=1e-3)
