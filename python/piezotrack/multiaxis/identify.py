@@ -180,7 +180,7 @@ def _level(
     response: MultiAxisResponse, target: Target, terms: ModalTerms, scale: float
 ) -> AxesLevel:
     decay_sd, angle_sd = pole_deviations(target, terms, response.variance / scale**2)
-    # Whatever was minimised, errors are those of the displacement.
+    # Errors are those of the displacement, whichever weights were used.
     plain = _target(response, scale, 0.0)
     cost, _ = plain.misfit(terms)
     size = float(np.einsum("k,kij->", plain.weight, np.square(np.abs(plain.value))))

@@ -62,7 +62,7 @@ pub struct AxesLoop<F> {
     pub limits: Vec<[f64; 2]>,
 }
 
-/// What a loop did: readings without noise, and drives, sample by sample.
+/// Motion in a loop: readings without noise, and drives, sample by sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxesRun {
     /// Displacements, all sensors of a sample after each other.
