@@ -119,7 +119,7 @@ class MultiAxisResponse:
         return np.asarray(np.sqrt(self.variance * quantile))
 
     def score(self, record: MultiAxisRecord, *, skip: int = 100) -> Array:
-        """Return the error of the steady displacement that the responses foretell.
+        """Return the error of the steady displacement that the responses predict.
 
         Parameters
         ----------
