@@ -53,7 +53,7 @@ PATIENCE = 10.0
 
 @dataclass(frozen=True, kw_only=True)
 class Board:
-    """What a board says of itself.
+    """Properties of a board and of its controller.
 
     Attributes
     ----------

@@ -75,9 +75,10 @@ def test_the_tree_is_in_the_wheel() -> None:
     sources = next(
         line for line in (ROOT / "Makefile").read_text().splitlines() if line.startswith("SOURCES")
     )
-    assert {"'*.c'", "'*.h'"} <= set(sources.split())
+    assert {"'*.c'", "'*.h'", "'*.ld'", "Makefile"} <= set(sources.split())
+    tree = ROOT / "python" / "piezotrack" / "export"
     ignored = subprocess.run(
-        ["git", "check-ignore", "--no-index", *map(str, TREE.rglob("*.*"))],
+        ["git", "check-ignore", "--no-index", *map(str, tree.rglob("source/**/*"))],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -46,7 +46,11 @@ def plot_model(model: MultiAxisModel, fig: Figure | SubFigure | None = None) -> 
             axes[f"{i}{j}"].set_title(f"sensor {i}, drive {j}", fontsize="small")
     first = next(iter(axes.values()))
     legend_inside(first, ncols=2)
-    caption(figure, "Measured responses with their bands, the modes (lines) and the residual (dotted)", "medium")
+    caption(
+        figure,
+        "Measured responses with their bands, the modes (lines) and the residual (dotted)",
+        "medium",
+    )
     return whole(figure)
 
 
