@@ -252,16 +252,17 @@ void firmware_status(struct firmware_status *there)
 
 bool firmware_hold(real volts)
 {
-    if (!is_allowed(volts) || status.mode == MODE_FAULT) {
-        return false;
-    }
+    bool done;
     board_mask(true);
-    status.mode = MODE_HOLD;
-    status.left = 0;
-    ring_begin(0u);
-    put_out(volts);
+    done = is_allowed(volts) && (status.mode != MODE_FAULT);
+    if (done) {
+        status.mode = MODE_HOLD;
+        status.left = 0u;
+        ring_begin(0u);
+        put_out(volts);
+    }
     board_mask(false);
-    return true;
+    return done;
 }
 
 bool firmware_load(unsigned table, uint32_t first, const real *numbers, uint32_t count)
@@ -290,48 +291,50 @@ bool firmware_load(unsigned table, uint32_t first, const real *numbers, uint32_t
 
 bool firmware_play(uint32_t count, uint32_t divider, uint32_t lead)
 {
-    if (count == 0u || count > TABLE_SAMPLES || divider == 0u || divider > DIVIDER_MOST
-        || lead > UINT32_MAX - divider || status.mode == MODE_FAULT) {
-        return false;
-    }
+    bool done;
     board_mask(true);
-    table_count = count;
-    table_place = 0;
-    table_divider = divider;
-    table_wait = divider + lead;
-    status.left = count;
-    status.mode = MODE_PLAY;
-    ring_begin(count);
+    done = (count > 0u) && (count <= TABLE_SAMPLES) && (divider > 0u) && (divider <= DIVIDER_MOST)
+        && (lead <= (UINT32_MAX - divider)) && (status.mode != MODE_FAULT);
+    if (done) {
+        table_count = count;
+        table_place = 0u;
+        table_divider = divider;
+        table_wait = divider + lead;
+        status.left = count;
+        status.mode = MODE_PLAY;
+        ring_begin(count);
+    }
     board_mask(false);
-    return true;
+    return done;
 }
 
 static bool run(uint32_t count, uint32_t periods, bool played, real reference)
 {
-    if (status.mode == MODE_FAULT) {
-        return false;
-    }
+    bool done;
     board_mask(true);
-    if (status.mode != MODE_RUN) {
-        if (!controller_start(&loop, status.volts)) {
-            board_mask(false);
-            return false;
-        }
-        invalid_in_a_row = 0;
+    done = status.mode != MODE_FAULT;
+    if (done && (status.mode != MODE_RUN)) {
+        invalid_in_a_row = 0u;
+        done = controller_start(&loop, status.volts);
 #if CONTROLLER_SETTINGS > 0
-        (void)controller_retune(&loop, &settings);
+        if (done) {
+            (void)controller_retune(&loop, &settings);
+        }
 #endif
     }
-    table_count = count;
-    table_place = 0;
-    table_periods = periods;
-    table_played = played;
-    constant = reference;
-    status.left = count == 0u || periods > UINT32_MAX / count ? 0u : count * periods;
-    status.mode = MODE_RUN;
-    ring_begin(status.left);
+    if (done) {
+        const bool ends = (count > 0u) && (periods <= (UINT32_MAX / count));
+        table_count = count;
+        table_place = 0u;
+        table_periods = periods;
+        table_played = played;
+        constant = reference;
+        status.left = ends ? (count * periods) : 0u;
+        status.mode = MODE_RUN;
+        ring_begin(status.left);
+    }
     board_mask(false);
-    return true;
+    return done;
 }
 
 bool firmware_run(uint32_t count, uint32_t periods, bool played)
