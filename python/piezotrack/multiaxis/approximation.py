@@ -169,7 +169,7 @@ def approximate_axes(record: MultiAxisRecord) -> MultiAxisResponse:
     inverse of the variance of its noise, which the periods show, and of the nonlinear distortion,
     which the realisations show:
 
-    .. math:: \hat G = \Big(\sum_r w_r Y_r U_r^H\Big) \Big(\sum_r w_r U_r U_r^H\Big)^{-1}
+    .. math:: \hat G = (\sum_r w_r Y_r U_r^H) (\sum_r w_r U_r U_r^H)^{-1}
 
     Pintelon and Schoukens, System Identification, 2nd ed., 2012, chapters 3 and 4. Variances are
     averaged over neighbouring lines. Drives may be orthogonal blocks of random-phase multisines,
