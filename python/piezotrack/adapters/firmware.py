@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import struct
 import threading
 import time
@@ -18,8 +17,10 @@ from ..control.controller.controller import Controller
 from ..control.loop.run import Run
 from ..control.loop.tracking import Tracking
 from ..data.dataset import Dataset
+from ..data.dataset_arguments import MIN_SAMPLES
 from ..errors import DeviceError, ParameterError
 from ..export.c99.settings import settings_of
+from ..export.firmware.project import layout_on_board, sensor_span
 from ..hardware.device import Rates, Record
 from ..hardware.limits import check_within
 from ..hardware.options import Options
@@ -65,12 +66,16 @@ class Board:
         Sampling interval [s].
     limits : (float, float)
         Lowest and highest voltage [V].
+    span : (float, float)
+        Displacements at both ends of the ADC [m].
     memory : int
         Samples of a table that can be recorded whole.
     divider : int
         Most intervals of one sample of a table.
     settings : int
         Numbers that can be changed while it runs; 0 for none.
+    layout : int
+        Hash of which numbers these are.
     takes_voltages : bool
         Whether a loop adds the voltages of the table.
     """
@@ -79,9 +84,11 @@ class Board:
     real: int
     dt: float
     limits: tuple[float, float]
+    span: tuple[float, float]
     memory: int
     divider: int
     settings: int
+    layout: int
     takes_voltages: bool
 
 
@@ -269,11 +276,7 @@ class FirmwareDevice:
         DeviceError
             The board has a fault.
         """
-        expect("controller", controller, Controller, "pt.Controller")
-        if not math.isclose(controller.dt, self.board.dt, rel_tol=1e-6):
-            raise ParameterError(
-                "controller", f"{controller.dt:g} s", f"dt of the board, {self.board.dt:g} s"
-            )
+        self._check_controller(controller)
         if self.board.settings:
             self.retune(controller)
         run = Run(controller, reference_of(reference))
@@ -282,6 +285,9 @@ class FirmwareDevice:
             raise ParameterError(
                 "reference", f"{x.size} samples", f"at most {self.memory}", verb="has"
             )
+        if self.state().mode == "run":
+            # Tables in use are not changed: the voltage that is there is the start of the next run.
+            self.hold(self.voltage)
         note = "feedforward sample by sample on the board"
         volts = np.zeros(x.size)
         if self.board.takes_voltages:
@@ -352,14 +358,8 @@ class FirmwareDevice:
             raise ParameterError(
                 "controller", "given", "none: the firmware was exported with fixed numbers"
             )
+        self._check_controller(controller)
         values = settings_of(controller, single=self.board.real == 4)
-        if (names := tuple(self.settings())) != tuple(values):
-            raise ParameterError(
-                "controller",
-                f"{', '.join(values)} as numbers",
-                f"{', '.join(names)}, those of the firmware",
-                verb="has",
-            )
         self._ask("stage")
         for place, value in enumerate(values.values()):
             self._ask(f"set {place} {self._bits(value)}")
@@ -384,8 +384,21 @@ class FirmwareDevice:
     def log(self) -> Dataset:
         """Return the newest samples that the board has kept, as a log."""
         recorded = self.state().recorded
+        if recorded < MIN_SAMPLES:
+            raise DeviceError(
+                f"{self.channels[0]} has recorded {recorded} samples: expected at least "
+                f"{MIN_SAMPLES}"
+            )
         count = min(recorded, self.memory)
-        rows = self._recorded(count, recorded - count)
+        while True:
+            try:
+                rows = self._recorded(count, recorded - count)
+                break
+            except DeviceError:
+                # Older ones were overwritten meanwhile: fewer of the newest.
+                recorded, count = self.state().recorded, count // 2
+                if count < MIN_SAMPLES:
+                    raise
         return Dataset(
             u=rows[:, 3],
             y=rows[:, 4],
@@ -407,6 +420,32 @@ class FirmwareDevice:
         with self._lock:
             self._link.close()
 
+    def _check_controller(self, controller: Controller) -> None:
+        """Refuse a controller that is not that of the firmware but for its settings."""
+        expect("controller", controller, Controller, "pt.Controller")
+        single, board = self.board.real == 4, self.board
+        low, high = controller.limits
+        bottom, top = sensor_span(controller)
+        pairs = {
+            "dt": ((controller.dt,), (board.dt,), "s"),
+            "limits": ((low, high), board.limits, "V"),
+            "span": ((bottom, top), board.span, "m"),
+        }
+        for name, (given, there, unit) in pairs.items():
+            if not np.allclose(given, there, rtol=1e-6, atol=0.0):
+                mine, others = (" to ".join(f"{one:g}" for one in pair) for pair in (given, there))
+                raise ParameterError(
+                    "controller", f"{name} {mine} {unit}", f"{others} {unit}, as the firmware",
+                    verb="has",
+                )  # fmt: skip
+        if board.settings and layout_on_board(controller, single=single) != board.layout:
+            names = ", ".join(settings_of(controller, single=single))
+            others = ", ".join(self.settings())
+            raise ParameterError(
+                "controller", f"{names} as numbers", f"the structure of the firmware, {others}",
+                verb="has",
+            )  # fmt: skip
+
     def _identified(self, answer: str) -> Board:
         words = answer.split()
         named = dict(word.split("=", 1) for word in words if "=" in word)
@@ -417,15 +456,19 @@ class FirmwareDevice:
             )
         try:
             real = int(named["real"])
-            low, high = (_number(named[name], real) for name in ("low", "high"))
+            low, high, bottom, top = (
+                _number(named[name], real) for name in ("low", "high", "bottom", "top")
+            )
             return Board(
                 name=named["name"],
                 real=real,
                 dt=_rounded(_number(named["dt"], real), real),
                 limits=(low, high),
+                span=(bottom, top),
                 memory=min(int(named["table"]), int(named["ring"])),
                 divider=int(named["divider"]),
                 settings=int(named["settings"]),
+                layout=int(named["layout"]),
                 takes_voltages=named["voltages"] == "1",
             )
         except (KeyError, ValueError, struct.error):
@@ -495,10 +538,9 @@ class FirmwareDevice:
     def _live(self) -> None:
         """Give signs of life until the connection is closed or lost."""
         while not self._closed.wait(ALIVE):
-            try:
+            # A connection that was lost is made anew, also by this.
+            with suppress(DeviceError):
                 self._ask("ping")
-            except DeviceError:
-                return
 
     def _unexpected(self, message: str, answer: str) -> DeviceError:
         return DeviceError(f"{self._link.where} answered {shown(message)} with {shown(answer)}")

@@ -76,7 +76,10 @@ class Exported:
             return f"{text}; {self.note}" if self.note else text
         text = f"state {self.state_bytes} bytes; a step has {self.additions} additions, "
         text += f"{self.multiplications} multiplications, {self.divisions} divisions"
-        text += f"; at most {self.instructions} instructions on a Cortex-M"
+        numbers = "doubles" if self.bound == 0.0 else "floats"
+        text += (
+            f"; at most {self.instructions} instructions on a Cortex-M with a unit for {numbers}"
+        )
         if self.most_instructions != self.instructions:
             text += f", {self.most_instructions} beyond the limits"
         text += "" if self.bound == 0.0 else f"; within {self.bound:.3g} of the doubles"

@@ -9,6 +9,7 @@ import struct
 import subprocess
 import threading
 import time
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -152,15 +153,15 @@ def test_a_step_on_a_board_has_the_bits_and_the_instructions_that_are_stated(
 RUST = """
 #include <stdint.h>
 typedef double real;
-typedef struct { uint32_t nothing; } controller_state;
+typedef struct { uint32_t nothing; } inner_state;
 int axis_begin(void);
 double axis_volts(double reference, double measured, double feedforward);
 void axis_gave(double volts);
 void axis_forget(void);
-#define controller_init(loop) ((void)(loop), (void)axis_begin())
-#define controller_step(loop, reference, next, reading, volts) axis_volts(reference, reading, volts)
-#define controller_applied(loop, volts) (axis_gave(volts), 1)
-#define controller_reset(loop) axis_forget()
+#define inner_init(loop) ((void)(loop), (void)axis_begin())
+#define inner_step(loop, reference, next, reading, volts) axis_volts(reference, reading, volts)
+#define inner_applied(loop, volts) (axis_gave(volts), 1)
+#define inner_reset(loop) axis_forget()
 """
 
 
@@ -208,10 +209,13 @@ def test_gains_change_while_it_runs_as_those_of_a_session(
         device.follow(4e-5)
         assert within(lambda: device.state().recorded > 300)
         device.retune(other)
-        device.save_settings()
+        with pytest.raises(pt.DeviceError, match="moves"):
+            device.save_settings()
         assert device.settings()["pid_proportional"] == pytest.approx(3e4, rel=1e-6)
         assert within(lambda: device.state().recorded > 2000)
+        device.stop()
         log = device.log()
+        device.save_settings()
         device.close()
     if log.u.size < 4000:
         session, changed = one.start(), None
@@ -240,8 +244,15 @@ def test_gains_change_while_it_runs_as_those_of_a_session(
     with booted(one, tmp_path, "host", stage.address, kept) as (address, _):
         device = connected(address)
         assert device.settings()["pid_proportional"] == pytest.approx(2e4, rel=1e-6)
-        with pytest.raises(ParameterError, match="numbers"):
-            device.retune(controller())
+        for wrong in (
+            controller(),
+            replace(one, limits=(0.0, 30.0)),
+            replace(one, dt=1e-4),
+            replace(one, span=(-1e-5, 1e-4)),
+            replace(one, feedback=pt.control.LeadLag(kp=1e5, lead=0.01, lag=0.1)),
+        ):
+            with pytest.raises(ParameterError, match="firmware"):
+                device.retune(wrong)
         assert device.settings()["pid_proportional"] == pytest.approx(2e4, rel=1e-6)
         device.close()
 
@@ -270,6 +281,7 @@ class Clock:
         self._socket = socket.create_server(("127.0.0.1", 0))
         self.address: tuple[str, int] = self._socket.getsockname()[:2]
         self.status, self.volts, self.going = 0, [math.nan], True
+        self.code = 2**19
         self._thread = threading.Thread(target=self._run)
 
     def __enter__(self) -> Clock:
@@ -289,7 +301,7 @@ class Clock:
                 while not self.going:
                     time.sleep(0.001)
                 try:
-                    link.sendall(struct.pack("<IB", 2**19, self.status))
+                    link.sendall(struct.pack("<IB", self.code, self.status))
                     answer = link.recv(4, socket.MSG_WAITALL)
                 except OSError:
                     return
@@ -337,7 +349,78 @@ def test_samples_that_do_not_come_are_a_fault(tmp_path: Path) -> None:
         assert within(lambda: device.state().fault == "sampling")
         clock.going = True
         assert within(lambda: clock.volts[-1] == SAFE)
+        device.clear()
+        # Also on the way to the safe voltage.
+        device.hold(70.0)
+        assert within(lambda: clock.volts[-1] > 69.0)
+        device._ask("stop")
+        clock.going = False
+        assert within(lambda: device.state().fault == "sampling")
+        assert device.voltage == SAFE
+        clock.going = True
+        assert within(lambda: clock.volts[-1] == SAFE)
         device.close()
+
+
+@needs_gcc
+def test_a_second_reference_begins_from_the_voltage_that_is_there(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    one = controller(filters=[])
+    with booted(one, tmp_path, "host", stage.address) as (address, _):
+        device = connected(address)
+        first = device.track(one, "triangle:2Hz,5..10um,0.5s")
+        with pytest.raises(pt.DeviceError, match="in use"):
+            device._load("voltage", np.full(10, 70.0))
+        second = device.track(one, "triangle:2Hz,70..90um,0.5s")
+        device.close()
+    assert abs(second.voltage[0] - first.voltage[-1]) < 1.0
+    # The PID alone answers the step of the reference.
+    assert np.abs(np.diff(second.voltage)).max() < 3.0
+
+
+@needs_gcc
+@pytest.mark.parametrize("code", [0, 2**20 - 1])
+def test_a_sensor_at_an_end_of_its_range_gives_no_reading(code: int, tmp_path: Path) -> None:
+    one = controller()
+    with Clock(one) as clock, booted(one, tmp_path, "host", clock.address) as (address, _):
+        device = connected(address)
+        device.follow(4e-5)
+        clock.code = code
+        assert within(lambda: device.state().fault == "reading")
+        assert within(lambda: clock.volts[-1] == SAFE)
+        device.close()
+
+
+@needs_gcc
+def test_half_a_line_is_not_that_of_the_next_client(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    with booted(controller(), tmp_path, "host", stage.address) as (address, _):
+        host, port = address.removeprefix("firmware://").split(":")
+        with socket.create_connection((host, int(port))) as link:
+            link.sendall(b"hold 7")
+            time.sleep(0.1)
+        with socket.create_connection((host, int(port))) as link, link.makefile("rw") as lines:
+            lines.write("5\n")
+            lines.flush()
+            assert lines.readline().startswith("error command")
+
+
+@needs_gcc
+def test_a_client_that_does_not_read_is_hung_up_on(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    with booted(controller(), tmp_path, "host", stage.address) as (address, _):
+        host, port = address.removeprefix("firmware://").split(":")
+        with socket.create_connection((host, int(port))) as link:
+            link.sendall(b"hold 60\n")
+            assert within(lambda: stage.voltage > 59.9)
+            link.settimeout(0.5)
+            with suppress(OSError):
+                for _ in range(100_000):
+                    link.sendall(b"read 0 256\n")
+            assert within(lambda: stage.voltage == SAFE)
 
 
 @needs_gcc
@@ -368,11 +451,14 @@ def test_lines_that_make_no_sense_are_answered(
                 "run 1 1 2": "error run",
                 "read 0 257": "error samples",
                 "clear": "error clear",
+                "tune": "error tune",
+                "follow 1": "error follow",
+                "load reference 0 1e300": "error table",
                 "stage": "ok",
                 "set 99 1": "error set",
                 "set 0": "error set",
                 "set 0 1e30": "ok",
-                "tune": "error tune",
+                "tune ": "error tune",
                 "setting 99": "error setting",
                 "x" * 2000: "error line",
                 "ping ": "ok",
@@ -394,12 +480,23 @@ def test_a_wrong_address_is_told() -> None:
             pt.hardware.connect(f"firmware://{place}?timeout=0.2s")
 
 
+@needs_gcc
+@pytest.mark.parametrize("name", ["controller", "status", "loop", "axis_1"])
+def test_names_that_a_person_gives_build(name: str, tmp_path: Path) -> None:
+    pt.control.export_controller(controller(), tmp_path, to="firmware", name=name)
+    made(tmp_path, "host")
+    assert (tmp_path / f"{name}-host").exists()
+
+
 def test_what_cannot_be_a_firmware_is_refused(tmp_path: Path) -> None:
     export = pt.control.export_controller
     with pytest.raises(ParameterError, match="span"):
         export(controller(span=None), tmp_path, to="firmware")
     with pytest.raises(ParameterError, match="a file of the firmware"):
         export(controller(), tmp_path, to="firmware", name="ring")
+    for name in ("BOARD", "mps2_startup", "inner"):
+        with pytest.raises(ParameterError, match="a file of the firmware"):
+            export(controller(), tmp_path, to="firmware", name=name)
     with pytest.raises(ParameterError, match="loaded over its link"):
         export(controller(), tmp_path, to="firmware", table=np.ones(100))
     fast = controller(dt=1e-5, feedforward=DAHL.inverse())

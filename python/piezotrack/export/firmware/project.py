@@ -8,7 +8,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...errors import ParameterError
-from ..c99.parts import shape_of
+from ..c99.parts import parts_of, shape_of
+from ..c99.settings import layout_of
 from ..c99.sources import OBSERVERS, Sources, c_sources
 from ..c99.text import literal
 from ..vectors import range_of, rows_of
@@ -20,15 +21,22 @@ if TYPE_CHECKING:
     from ...control.controller.controller import Controller
     from ..vectors import Row
 
-__all__ = ["Project", "firmware_project", "project_files"]
+__all__ = [
+    "Project",
+    "firmware_project",
+    "layout_on_board",
+    "project_files",
+    "sensor_span",
+    "without_table",
+]
 
 # Files of the project beside the controller and its configuration; NAME-dependent is the Makefile.
 SOURCE = files(__package__) / "source"
 GENERATED = ("configuration.h", "vectors.h")
 # Names of files and functions that the firmware has itself.
 TAKEN = (
-    *("board", "configuration", "count", "firmware", "host", "mps2", "protocol", "ring", "text"),
-    "vectors",
+    *("board", "configuration", "count", "firmware", "host", "inner", "main", "mps2"),
+    *("mps2_startup", "protocol", "real", "ring", "text", "vectors"),
 )
 # Time of the way from one limit to the other when the output is led to the safe voltage [s].
 RAMP = 0.5
@@ -54,7 +62,8 @@ class Project(NamedTuple):
 
 def project_files(name: str) -> list[str]:
     """Return the paths of the files of a project, those of the controller first."""
-    if name in TAKEN:
+    # Guards of headers are in capitals.
+    if name.lower() in TAKEN:
         raise ParameterError("name", f"{name!r}, a file of the firmware", "another name")
     own = [f"{name}.h", f"{name}.c", *GENERATED]
     return own + [path for path, _ in _sources(SOURCE)]
@@ -102,8 +111,8 @@ def firmware_project(
         raise ParameterError(
             "controller", f"in {controller.drive_unit}", "V, which a DAC puts out", verb="commands"
         )
-    span = _sensor_span(controller)
-    inside = _without_table(controller)
+    span = sensor_span(controller)
+    inside = without_table(controller)
     sources = c_sources(inside, name, single=single, fixed=fixed)
     rows = rows_of(inside)[:VECTORS]
     texts = {path: text for path, text in sources.files.items() if path.startswith(f"{name}.")}
@@ -126,7 +135,7 @@ def _sources(folder: Traversable) -> Iterator[tuple[str, str]]:
             yield one.name, one.read_text(encoding="utf-8")
 
 
-def _without_table(controller: Controller) -> Controller:
+def without_table(controller: Controller) -> Controller:
     """Leave a feedforward that has no form in C sample by sample to the client."""
     if controller.feedforward is None:
         return controller
@@ -135,12 +144,31 @@ def _without_table(controller: Controller) -> Controller:
     except ParameterError as error:
         if error.argument != "feedforward":
             raise
-        return replace(controller, feedforward=None, span=_sensor_span(controller))
+        return replace(controller, feedforward=None, span=sensor_span(controller))
     return controller
 
 
-def _sensor_span(controller: Controller) -> tuple[float, float]:
-    """Displacements at both ends of the ADC [m]."""
+def layout_on_board(controller: Controller, *, single: bool) -> int:
+    """Compute the hash of which numbers the settings of a firmware are; see `layout_of`.
+
+    Parameters
+    ----------
+    controller : Controller
+        The controller.
+    single : bool
+        Whether numbers are floats.
+
+    Returns
+    -------
+    int
+        The hash.
+    """
+    inside = without_table(controller)
+    return layout_of(inside, parts_of(inside, None, single=single), single=single)
+
+
+def sensor_span(controller: Controller) -> tuple[float, float]:
+    """Return the displacements at both ends of the ADC [m]."""
     if controller.span is not None:
         return controller.span
     if controller.feedforward is None:
@@ -268,7 +296,7 @@ typedef @NAME_real real;
 #endif
 
 /* From here on: what belongs to the controller. Do not edit. */
-#define CONTROLLER_NAME "@NAME"
+#define INNER_NAME "@NAME"
 #define DRIVE_UNIT "V"
 #define REAL_BYTES @bytes
 #define SAMPLING_INTERVAL @dt
@@ -292,63 +320,63 @@ typedef @NAME_real real;
 #define CONVERTERS_NUMBERS 7
 
 /* Whether a step takes a feedforward of the client. */
-#define CONTROLLER_TAKES_VOLTS @takes
+#define INNER_TAKES_VOLTS @takes
 
-typedef @NAME_state controller_state;
+typedef @NAME_state inner_state;
 
-static inline void controller_init(controller_state *loop)
+static inline void inner_init(inner_state *loop)
 {
     @NAME_init(loop);
 }
 
-static inline bool controller_start(controller_state *loop, real present)
+static inline bool inner_start(inner_state *loop, real present)
 {
     return @NAME_start(loop, present) != 0;
 }
 
-static inline real controller_step(
-    controller_state *loop, real reference, real next, real reading, real volts)
+static inline real inner_step(
+    inner_state *loop, real reference, real next, real reading, real volts)
 {
 @call
 }
 
-static inline bool controller_applied(controller_state *loop, real volts)
+static inline bool inner_applied(inner_state *loop, real volts)
 {
     return @NAME_applied(loop, volts) != 0;
 }
 
-static inline void controller_reset(controller_state *loop)
+static inline void inner_reset(inner_state *loop)
 {
     @NAME_reset(loop);
 }
 
-static inline bool controller_saturated(const controller_state *loop)
+static inline bool inner_saturated(const inner_state *loop)
 {
     return loop->last.saturated != 0u;
 }
 
-static inline bool controller_reading_ok(const controller_state *loop)
+static inline bool inner_reading_ok(const inner_state *loop)
 {
     return loop->last.measurement_ok != 0u;
 }
 
-#define CONTROLLER_SETTINGS @CAPITALS_SETTINGS
-#if CONTROLLER_SETTINGS > 0
-#define controller_setting_list @NAME_setting_list
+#define INNER_SETTINGS @CAPITALS_SETTINGS
+#if INNER_SETTINGS > 0
+#define inner_setting_list @NAME_setting_list
 
-typedef @NAME_settings controller_settings;
+typedef @NAME_settings inner_settings;
 
-static inline void controller_settings_default(controller_settings *settings)
+static inline void inner_settings_default(inner_settings *settings)
 {
     @NAME_settings_default(settings);
 }
 
-static inline void controller_settings_seal(controller_settings *settings)
+static inline void inner_settings_seal(inner_settings *settings)
 {
     @NAME_settings_seal(settings);
 }
 
-static inline bool controller_retune(controller_state *loop, const controller_settings *settings)
+static inline bool inner_retune(inner_state *loop, const inner_settings *settings)
 {
     return @NAME_retune(loop, settings) != 0;
 }

@@ -17,7 +17,8 @@
    within board_get. */
 void board_init(void);
 
-/* Puts a code out at the DAC. Called once within each firmware_sample, and by firmware_init. */
+/* Puts a code out at the DAC: within each firmware_sample, and by the main loop with samples held
+   back. */
 void board_write(uint32_t code);
 
 /* Time since the start, ms; wraps around. */

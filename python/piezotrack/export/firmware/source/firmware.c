@@ -4,9 +4,9 @@
 #include "protocol.h"
 #include "ring.h"
 
-static controller_state loop;
-#if CONTROLLER_SETTINGS > 0
-static controller_settings settings; /* in use: a start would take those of the design */
+static inner_state loop;
+#if INNER_SETTINGS > 0
+static inner_settings settings; /* in use: a start would take those of the design */
 #endif
 static struct firmware_status status = {MODE_OFF, FAULT_NONE, 0, 0, 0, 0, SAFE_VOLTS, 0, 0};
 static real volts_table[TABLE_SAMPLES];
@@ -32,9 +32,10 @@ static real not_a_number(void)
     return zero / zero;
 }
 
-static bool is_finite(real value)
+/* A displacement that the sensor can show; false for NaN. */
+static bool is_shown(real metres)
 {
-    return (value - value) <= (real)0;
+    return (metres >= ADC_LOW_METRES) && (metres <= ADC_HIGH_METRES);
 }
 
 static bool is_allowed(real volts)
@@ -64,6 +65,13 @@ static void put_out(real volts)
     }
     status.volts = kept;
     board_write((uint32_t)code);
+}
+
+/* At the safe voltage, and to stay there. */
+static bool is_safe(void)
+{
+    return ((status.mode == MODE_OFF) || (status.mode == MODE_FAULT))
+        && !((status.volts < SAFE_VOLTS) || (status.volts > SAFE_VOLTS));
 }
 
 static bool is_moving(void)
@@ -131,12 +139,14 @@ static real follow(real reading, real *reference)
         }
         status.left = status.left > 0u ? status.left - 1u : 0u;
     }
-    return controller_step(&loop, *reference, next, reading, forward);
+    return inner_step(&loop, *reference, next, reading, forward);
 }
 
 void firmware_sample(uint32_t code, unsigned from_converters)
 {
-    const bool invalid = (from_converters & BOARD_INVALID) != 0u;
+    /* a code at an end is that of a sensor out of its range, or of a cable that is torn */
+    const bool invalid = ((from_converters & BOARD_INVALID) != 0u) || (code == 0u)
+        || (code >= (uint32_t)ADC_CODE_MOST);
     const bool overrun = (from_converters & BOARD_OVERRUN) != 0u;
     struct ring_sample sample;
     real volts = status.volts;
@@ -172,8 +182,8 @@ void firmware_sample(uint32_t code, unsigned from_converters)
         break;
     case MODE_RUN:
         volts = follow(status.reading, &reference);
-        sample.flags |= SAMPLE_LOOP | (controller_saturated(&loop) ? SAMPLE_SATURATED : 0u);
-        invalid_in_a_row = controller_reading_ok(&loop) ? 0u : invalid_in_a_row + 1u;
+        sample.flags |= SAMPLE_LOOP | (inner_saturated(&loop) ? SAMPLE_SATURATED : 0u);
+        invalid_in_a_row = inner_reading_ok(&loop) ? 0u : invalid_in_a_row + 1u;
         if (invalid_in_a_row >= INVALID_MOST) {
             fail(FAULT_READING);
         }
@@ -201,16 +211,16 @@ void firmware_sample(uint32_t code, unsigned from_converters)
 
 void firmware_init(void)
 {
-    controller_init(&loop);
+    inner_init(&loop);
     status.volts = SAFE_VOLTS;
     status.reading = not_a_number();
     status.reference = not_a_number();
-#if CONTROLLER_SETTINGS > 0
+#if INNER_SETTINGS > 0
     {
-        controller_settings saved;
-        controller_settings_default(&settings);
+        inner_settings saved;
+        inner_settings_default(&settings);
         /* refused where they are of another controller */
-        if (board_recall(&saved, (uint32_t)sizeof saved) && controller_retune(&loop, &saved)) {
+        if (board_recall(&saved, (uint32_t)sizeof saved) && inner_retune(&loop, &saved)) {
             settings = saved;
         }
     }
@@ -223,19 +233,18 @@ void firmware_init(void)
 void firmware_poll(void)
 {
     const uint32_t now = board_millis();
-    const uint32_t since_line = protocol_poll(now);
+    const uint32_t since_line = protocol_poll();
     board_mask(true);
     if (sampled != 0u) {
         sampled = 0;
         last_sample = now;
     }
-    if (is_moving()) {
-        if (!board_linked() || since_line > LINK_TIMEOUT_MS) {
-            fail(FAULT_LINK);
-        } else if (now - last_sample > SAMPLING_TIMEOUT_MS) {
-            fail(FAULT_SAMPLING);
-            put_out(SAFE_VOLTS); /* no sample would lead it there */
-        }
+    if (is_moving() && (!board_linked() || (since_line > LINK_TIMEOUT_MS))) {
+        fail(FAULT_LINK);
+    }
+    if (((now - last_sample) > SAMPLING_TIMEOUT_MS) && !is_safe()) {
+        fail(FAULT_SAMPLING);
+        put_out(SAFE_VOLTS); /* no sample leads it there */
     }
     board_mask(false);
     board_feed();
@@ -268,12 +277,13 @@ bool firmware_hold(real volts)
 bool firmware_load(unsigned table, uint32_t first, const real *numbers, uint32_t count)
 {
     uint32_t i;
-    if (first > TABLE_SAMPLES || count > TABLE_SAMPLES - first || status.mode == MODE_PLAY) {
-        return false;
+    if (first > TABLE_SAMPLES || count > TABLE_SAMPLES - first || status.mode == MODE_PLAY
+        || ((status.mode == MODE_RUN) && (table_count > 0u))) {
+        return false; /* a table in use is not changed */
     }
     for (i = 0; i < count; i++) {
         const real number = numbers[i];
-        if (table == TABLE_VOLTS ? !is_allowed(number) : !is_finite(number)) {
+        if (table == TABLE_VOLTS ? !is_allowed(number) : !is_shown(number)) {
             return false;
         }
     }
@@ -315,10 +325,10 @@ static bool run(uint32_t count, uint32_t periods, bool played, real reference)
     done = status.mode != MODE_FAULT;
     if (done && (status.mode != MODE_RUN)) {
         invalid_in_a_row = 0u;
-        done = controller_start(&loop, status.volts);
-#if CONTROLLER_SETTINGS > 0
+        done = inner_start(&loop, status.volts);
+#if INNER_SETTINGS > 0
         if (done) {
-            (void)controller_retune(&loop, &settings);
+            (void)inner_retune(&loop, &settings);
         }
 #endif
     }
@@ -339,7 +349,7 @@ static bool run(uint32_t count, uint32_t periods, bool played, real reference)
 
 bool firmware_run(uint32_t count, uint32_t periods, bool played)
 {
-    if (count == 0u || count > TABLE_SAMPLES || (played && (CONTROLLER_TAKES_VOLTS == 0))) {
+    if (count == 0u || count > TABLE_SAMPLES || (played && (INNER_TAKES_VOLTS == 0))) {
         return false;
     }
     return run(count, periods, played, (real)0);
@@ -347,7 +357,7 @@ bool firmware_run(uint32_t count, uint32_t periods, bool played)
 
 bool firmware_follow(real reference)
 {
-    return is_finite(reference) && run(0u, 0u, false, reference);
+    return is_shown(reference) && run(0u, 0u, false, reference);
 }
 
 bool firmware_stop(void)
@@ -375,11 +385,20 @@ bool firmware_clear(void)
     return done;
 }
 
+uint32_t firmware_layout(void)
+{
+#if INNER_SETTINGS > 0
+    return settings.layout;
+#else
+    return 0u;
+#endif
+}
+
 bool firmware_settings(real *numbers)
 {
-#if CONTROLLER_SETTINGS > 0
+#if INNER_SETTINGS > 0
     uint32_t i;
-    for (i = 0; i < (uint32_t)CONTROLLER_SETTINGS; i++) {
+    for (i = 0; i < (uint32_t)INNER_SETTINGS; i++) {
         numbers[i] = settings.value[i];
     }
     return true;
@@ -391,16 +410,16 @@ bool firmware_settings(real *numbers)
 
 bool firmware_retune(const real *numbers)
 {
-#if CONTROLLER_SETTINGS > 0
-    controller_settings next;
+#if INNER_SETTINGS > 0
+    inner_settings next;
     uint32_t i;
     bool done;
-    for (i = 0; i < (uint32_t)CONTROLLER_SETTINGS; i++) {
+    for (i = 0; i < (uint32_t)INNER_SETTINGS; i++) {
         next.value[i] = numbers[i];
     }
-    controller_settings_seal(&next);
+    inner_settings_seal(&next);
     board_mask(true);
-    done = controller_retune(&loop, &next);
+    done = inner_retune(&loop, &next);
     if (done) {
         settings = next;
     }
@@ -414,8 +433,9 @@ bool firmware_retune(const real *numbers)
 
 bool firmware_save(void)
 {
-#if CONTROLLER_SETTINGS > 0
-    return board_store(&settings, (uint32_t)sizeof settings);
+#if INNER_SETTINGS > 0
+    /* a memory that is written may hold up the samples */
+    return !is_moving() && board_store(&settings, (uint32_t)sizeof settings);
 #else
     return false;
 #endif

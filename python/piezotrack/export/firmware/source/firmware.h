@@ -59,6 +59,7 @@ bool firmware_run(uint32_t count, uint32_t periods, bool played);
 bool firmware_follow(real reference);
 bool firmware_stop(void);
 bool firmware_clear(void);
+uint32_t firmware_layout(void);
 bool firmware_settings(real *numbers);
 bool firmware_retune(const real *numbers);
 bool firmware_save(void);

@@ -6,7 +6,7 @@
 #include "text.h"
 
 /* Longest line, and numbers in a line of "load" at most. */
-#define LINE_BYTES 1024
+#define LINE_BYTES 1024u
 #define NUMBERS 48u
 /* Samples in an answer of "read" at most. */
 #define READ_MOST 256u
@@ -16,8 +16,9 @@ static uint32_t length;
 static uint32_t last_line; /* ms */
 static uint8_t too_long;
 
-#if CONTROLLER_SETTINGS > 0
-static real staged[CONTROLLER_SETTINGS];
+#if INNER_SETTINGS > 0
+static real staged[INNER_SETTINGS];
+static bool has_staged; /* since the last "tune" */
 #endif
 
 static const char *const modes[] = {"off", "ramp", "hold", "play", "run", "fault"};
@@ -47,7 +48,7 @@ static void named_bits(const char *name, real number)
 
 static void identify(void)
 {
-    text_put("ok piezotrack-firmware 1 name=" CONTROLLER_NAME " unit=" DRIVE_UNIT);
+    text_put("ok piezotrack-firmware 1 name=" INNER_NAME " unit=" DRIVE_UNIT);
     named_count(" real=", REAL_BYTES);
     named_bits(" dt=", SAMPLING_INTERVAL);
     named_bits(" low=", LIMITS_LOW);
@@ -56,8 +57,11 @@ static void identify(void)
     named_count(" table=", TABLE_SAMPLES);
     named_count(" ring=", RING_SAMPLES);
     named_count(" divider=", DIVIDER_MOST);
-    named_count(" settings=", CONTROLLER_SETTINGS);
-    named_count(" voltages=", CONTROLLER_TAKES_VOLTS);
+    named_bits(" bottom=", ADC_LOW_METRES);
+    named_bits(" top=", ADC_HIGH_METRES);
+    named_count(" settings=", INNER_SETTINGS);
+    named_count(" layout=", firmware_layout());
+    named_count(" voltages=", INNER_TAKES_VOLTS);
 }
 
 static void show_status(void)
@@ -110,7 +114,7 @@ static void load(char *rest)
         count++;
     }
     say(firmware_load(table, first, numbers, count),
-        "table: beyond the limits or the memory, or it is played now");
+        "table: beyond limits, span or memory, or in use");
 }
 
 static void read_samples(char *rest)
@@ -138,6 +142,7 @@ static void read_samples(char *rest)
         named_bits(":", sample.reference);
         named_bits(":", sample.volts);
         named_bits(":", sample.reading);
+        board_feed();
     }
 }
 
@@ -163,23 +168,23 @@ static void run_table(char *rest)
         "run: expected samples, periods, whether voltages are added; no fault");
 }
 
-#if CONTROLLER_SETTINGS > 0
+#if INNER_SETTINGS > 0
 static void show_setting(char *rest)
 {
     uint32_t place = 0;
-    real numbers[CONTROLLER_SETTINGS];
-    if (!text_count(text_word(&rest), &place) || place >= (uint32_t)CONTROLLER_SETTINGS) {
+    real numbers[INNER_SETTINGS];
+    if (!text_count(text_word(&rest), &place) || place >= (uint32_t)INNER_SETTINGS) {
         say(false, "setting: expected its place, from 0");
         return;
     }
     (void)firmware_settings(numbers);
     text_put("ok ");
-    text_put(controller_setting_list[place].name);
+    text_put(inner_setting_list[place].name);
     text_put(" ");
-    text_put(controller_setting_list[place].unit);
+    text_put(inner_setting_list[place].unit);
     named_bits(" ", numbers[place]);
-    named_bits(" ", controller_setting_list[place].low);
-    named_bits(" ", controller_setting_list[place].high);
+    named_bits(" ", inner_setting_list[place].low);
+    named_bits(" ", inner_setting_list[place].high);
     text_put(" ");
     text_put_decimal(numbers[place]);
 }
@@ -188,7 +193,7 @@ static void stage_setting(char *rest)
 {
     uint32_t place = 0;
     real number;
-    if (!text_count(text_word(&rest), &place) || place >= (uint32_t)CONTROLLER_SETTINGS
+    if (!text_count(text_word(&rest), &place) || place >= (uint32_t)INNER_SETTINGS
         || !text_number(text_word(&rest), &number)) {
         say(false, "set: expected a place, from 0, and a number");
         return;
@@ -203,13 +208,16 @@ static bool answer_settings(const char *verb, char *rest)
     if (text_same(verb, "setting")) {
         show_setting(rest);
     } else if (text_same(verb, "stage")) {
-        say(firmware_settings(staged), "");
+        has_staged = firmware_settings(staged);
+        say(has_staged, "");
     } else if (text_same(verb, "set")) {
         stage_setting(rest);
     } else if (text_same(verb, "tune")) {
-        say(firmware_retune(staged), "tune: a number is out of its range; nothing changed");
+        say(has_staged && firmware_retune(staged),
+            "tune: not staged, or a number is out of its range; nothing changed");
+        has_staged = false;
     } else if (text_same(verb, "save")) {
-        say(firmware_save(), "save: the board keeps nothing");
+        say(firmware_save(), "save: the output moves, or the board keeps nothing");
     } else {
         return false;
     }
@@ -262,7 +270,7 @@ static void answer(char *rest)
     } else if (text_same(verb, "run")) {
         run_table(rest);
     } else if (text_same(verb, "follow")) {
-        one_number(rest, firmware_follow, "follow: expected a displacement in m; no fault");
+        one_number(rest, firmware_follow, "follow: expected a displacement within the span, m; no fault");
     } else if (text_same(verb, "stop")) {
         say(firmware_stop(), "");
     } else if (text_same(verb, "clear")) {
@@ -276,31 +284,45 @@ static void answer(char *rest)
     board_put('\n');
 }
 
-uint32_t protocol_poll(uint32_t now)
+static void answer_line(void)
 {
-    int byte = board_get();
-    while (byte >= 0) {
-        last_line = now;
-        if (byte == '\n') {
-            if (too_long != 0u) {
-                text_put("error line: longer than 1023 bytes\n");
-            } else {
-                line[length] = '\0';
-                answer(line);
-            }
-            length = 0;
-            too_long = 0;
-            break; /* one line at a time: the watch over the samples goes on */
+    if (too_long != 0u) {
+        text_put("error line: longer than 1023 bytes\n");
+    } else {
+        line[length] = '\0';
+        answer(line);
+    }
+    length = 0u;
+    too_long = 0u;
+}
+
+uint32_t protocol_poll(void)
+{
+    uint32_t bytes;
+    if (!board_linked()) {
+        /* half a line of a client that has gone is not the next one's */
+        length = 0u;
+        too_long = 0u;
+    }
+    /* a line at most, and so many bytes: the watch over the samples goes on */
+    for (bytes = 0u; bytes < LINE_BYTES; bytes++) {
+        const int byte = board_get();
+        if (byte < 0) {
+            break;
         }
-        if (byte != '\r') {
-            if (length + 1u < LINE_BYTES) {
+        if (byte == (int)'\n') {
+            answer_line();
+            last_line = board_millis();
+            break;
+        }
+        if (byte != (int)'\r') {
+            if ((length + 1u) < LINE_BYTES) {
                 line[length] = (char)byte;
                 length++;
             } else {
-                too_long = 1;
+                too_long = 1u;
             }
         }
-        byte = board_get();
     }
-    return now - last_line;
+    return board_millis() - last_line;
 }

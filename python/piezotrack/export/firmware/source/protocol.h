@@ -6,7 +6,7 @@
 
 #include <stdint.h>
 
-/* Answers the lines that have come; returns the time since the last one, ms. */
-uint32_t protocol_poll(uint32_t now);
+/* Answers a line that has come; returns the time since the last one, ms. */
+uint32_t protocol_poll(void);
 
 #endif

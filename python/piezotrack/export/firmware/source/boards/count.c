@@ -17,7 +17,7 @@
 void systick_handler(void);
 void converters_handler(void);
 
-static controller_state loop;
+static inner_state loop;
 
 void systick_handler(void)
 {
@@ -75,7 +75,7 @@ static inline volatile uint32_t *below_stack(void)
 /* Kept out of the loop, so that its stack is that of a call. */
 static __attribute__((noinline)) real step(const real *row)
 {
-    return controller_step(&loop, row[0], row[1], row[2], row[3]);
+    return inner_step(&loop, row[0], row[1], row[2], row[3]);
 }
 
 int main(void)
@@ -93,7 +93,7 @@ int main(void)
     SYSTICK_RELOAD = 0xFFFFFFu;
     SYSTICK_VALUE = 0;
     SYSTICK_CONTROL = 5u;
-    controller_init(&loop);
+    inner_init(&loop);
     nothing = SYSTICK_VALUE;
     nothing = ticks(nothing, SYSTICK_VALUE);
     for (i = 0; i < VECTORS; i++) {
@@ -101,7 +101,7 @@ int main(void)
         uint32_t begin, taken;
         real volts;
         if (row[4] > 0) {
-            controller_reset(&loop);
+            inner_reset(&loop);
         }
         if (i % 16u == 0u) {
             for (k = 0; k < STACK_WORDS; k++) {
@@ -125,7 +125,7 @@ int main(void)
             apart++;
         }
         if (row[5] - row[5] <= 0) {
-            (void)controller_applied(&loop, row[5]);
+            (void)inner_applied(&loop, row[5]);
         }
     }
     say_count("instructions mean ", (uint32_t)(sum / VECTORS));

@@ -17,6 +17,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -25,6 +26,8 @@
 /* Bytes of a sample from the converters, and of the answer. */
 #define FRAME 5
 #define ANSWER 4
+/* How long an answer may take to leave before the client is hung up on, us. */
+#define LEAVING_US 50000
 /* How long a sample or a line is waited for, ms. */
 #define PATIENCE 1
 
@@ -174,11 +177,16 @@ static void take_sample(void)
 
 int board_get(void)
 {
+    bool had_client;
     struct pollfd watched[2] = {{0, POLLIN, 0}, {0, POLLIN, 0}};
     if (input_place < input_bytes) {
         return input[input_place++];
     }
+    had_client = client >= 0;
     flush_output();
+    if (had_client && (client < 0)) {
+        return -1; /* before another one is taken */
+    }
     watched[0].fd = held ? -1 : converters;
     watched[1].fd = client >= 0 ? client : listener;
     if (poll(watched, 2, PATIENCE) <= 0) {
@@ -193,7 +201,9 @@ int board_get(void)
     if (client < 0) {
         client = accept(listener, NULL, NULL);
         if (client >= 0) {
+            const struct timeval leaving = {0, LEAVING_US};
             without_delay(client);
+            (void)setsockopt(client, SOL_SOCKET, SO_SNDTIMEO, &leaving, sizeof leaving);
         }
         return -1;
     }

@@ -145,6 +145,7 @@ void board_mask(bool held)
         INTERRUPT_DISABLE = 1u << CONVERTERS_INTERRUPT;
         __asm volatile("dsb\n isb" ::: "memory");
     } else {
+        __asm volatile("" ::: "memory");
         INTERRUPT_ENABLE = 1u << CONVERTERS_INTERRUPT;
     }
 }
