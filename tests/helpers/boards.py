@@ -29,6 +29,8 @@ BOARDS = [
     pytest.param("host", marks=needs_gcc),
     *(pytest.param(name, marks=[needs_cross, pytest.mark.slow]) for name in MACHINES),
 ]
+# Displacements at both ends of the ADC [m].
+SPAN = (-2e-5, 1.5e-4)
 # On a busy computer a thread may wait for long.
 PATIENT = ("-DLINK_TIMEOUT_MS=4000u", "-DSAMPLING_TIMEOUT_MS=60000u")
 
@@ -104,3 +106,25 @@ def connected(address: str) -> pt.hardware.FirmwareDevice:
             assert isinstance(device, pt.hardware.FirmwareDevice)
             return device
     raise AssertionError
+
+
+def controller(**parts: Any) -> pt.Controller:
+    """A loop at 1 kHz, with some parts replaced."""
+    given: dict[str, Any] = {
+        "dt": 1e-3,
+        "limits": (0.0, 75.0),
+        "span": SPAN,
+        "feedback": pt.Pid.from_um(kp=0.02, ti=0.005),
+        "filters": [pt.Notch(160.0)],
+    }
+    return pt.Controller(**given | parts)
+
+
+def within(condition: Any, seconds: float = 20.0) -> bool:
+    """Whether a condition holds within a time."""
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.01)
+    return True

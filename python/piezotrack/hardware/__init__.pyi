@@ -2,7 +2,7 @@
 # _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
 from ..adapters.epics import ophyd_player as ophyd_player
 from ..adapters.epics import serve_epics as serve_epics
-from ..adapters.firmware import FirmwareDevice as FirmwareDevice
+from ..adapters.firmware.device import FirmwareDevice as FirmwareDevice
 from ..adapters.gcs.device import GcsDevice as GcsDevice
 from ..adapters.ni import NiDevice as NiDevice
 from ..adapters.scpi import ScpiBuffer as ScpiBuffer

@@ -1,39 +1,37 @@
-"""A board that runs a firmware project of this package: its client, as a device."""
+"""A board that runs a firmware of this package, as a device."""
 
 from __future__ import annotations
 
 import struct
-import threading
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .._support.arguments import expect, finite, not_negative, positive
-from .._support.arrays import signal_of
-from ..control.controller.controller import Controller
-from ..control.loop.run import Run
-from ..control.loop.tracking import Tracking
-from ..data.dataset import Dataset
-from ..data.dataset_arguments import MIN_SAMPLES
-from ..errors import DeviceError, ParameterError
-from ..export.c99.settings import settings_of
-from ..export.firmware.project import layout_on_board, sensor_span
-from ..hardware.device import Rates, Record
-from ..hardware.limits import check_within
-from ..hardware.options import Options
-from ..references.parse import reference_of
-from .answers import shown
-from .scpi_link import Link
+from ..._support.arguments import expect, finite, not_negative, positive
+from ..._support.arrays import signal_of
+from ...control.controller.controller import Controller
+from ...control.loop.run import Run
+from ...control.loop.tracking import Tracking
+from ...data.dataset import Dataset
+from ...data.dataset_arguments import MIN_SAMPLES
+from ...errors import DeviceError, ParameterError
+from ...export.c99.settings import settings_of
+from ...export.firmware.project import layout_on_board, sensor_span
+from ...hardware.device import Rates, Record
+from ...hardware.limits import check_within
+from ...hardware.options import Options
+from ...references.parse import reference_of
+from .line import GLANCE, PATIENCE, BoardLine
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
-    from ..references.reference import Reference
+    from ...references.reference import Reference
+    from .line import BoardState
 
     Array = NDArray[np.float64]
 
@@ -41,83 +39,8 @@ __all__ = ["FirmwareDevice"]
 
 FORM = "firmware://HOST:PORT[?timeout=5s]"
 PORT, TIMEOUT = 5555, 5.0
-# Numbers in a message, samples in an answer, as in protocol.c.
-NUMBERS, SAMPLES = 48, 128
 # Flags of a sample, as in ring.h.
 SATURATED = 1
-# Time between two signs of life [s], a quarter of the firmware's patience, and two looks whether
-# a table has ended.
-ALIVE, GLANCE = 0.25, 0.02
-# How much longer than its time a table may take [s].
-PATIENCE = 10.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Board:
-    """Properties of a board and of its controller.
-
-    Attributes
-    ----------
-    name : str
-        Name of the controller.
-    real : int
-        Bytes of its numbers.
-    dt : float
-        Sampling interval [s].
-    limits : (float, float)
-        Lowest and highest voltage [V].
-    span : (float, float)
-        Displacements at both ends of the ADC [m].
-    memory : int
-        Samples of a table that can be recorded whole.
-    divider : int
-        Most intervals of one sample of a table.
-    settings : int
-        Numbers that can be changed while it runs; 0 for none.
-    layout : int
-        Hash of which numbers these are.
-    takes_voltages : bool
-        Whether a loop adds the voltages of the table.
-    """
-
-    name: str
-    real: int
-    dt: float
-    limits: tuple[float, float]
-    span: tuple[float, float]
-    memory: int
-    divider: int
-    settings: int
-    layout: int
-    takes_voltages: bool
-
-
-@dataclass(frozen=True, kw_only=True)
-class BoardState:
-    """State of a board.
-
-    Attributes
-    ----------
-    mode : {"off", "ramp", "hold", "play", "run", "fault"}
-        What it does.
-    fault : {"none", "overrun", "reading", "link", "sampling"}
-        Why it led the output to the safe voltage.
-    tick, left, recorded, overruns, invalid : int
-        Samples since the start, until the end of a table, in the record; samples that took longer
-        than their interval, and without a reading.
-    voltage, reading : float
-        Output [V], and the last reading [m]; NaN for none.
-    """
-
-    mode: str
-    fault: str
-    tick: int
-    left: int
-    recorded: int
-    overruns: int
-    invalid: int
-    voltage: float
-    reading: float
 
 
 class FirmwareDevice:
@@ -143,14 +66,8 @@ class FirmwareDevice:
     """
 
     def __init__(self, host: str, port: int = PORT, *, timeout: float = TIMEOUT) -> None:
-        self._link = Link(host, port, positive("timeout", timeout, "s"))
-        self._lock, self._closed = threading.Lock(), threading.Event()
-        try:
-            self.board = self._identified(self._ask("id"))
-        except BaseException:
-            self._link.close()
-            raise
-        threading.Thread(target=self._live, daemon=True).start()
+        self._line = BoardLine(host, port, positive("timeout", timeout, "s"))
+        self.board = self._line.board
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -171,7 +88,7 @@ class FirmwareDevice:
     @property
     def channels(self) -> tuple[str, ...]:
         """Name of the controller, and place."""
-        return (f"{self.board.name} at {self._link.where}",)
+        return (self._line.name,)
 
     @property
     def voltage(self) -> float:
@@ -180,35 +97,22 @@ class FirmwareDevice:
 
     def state(self) -> BoardState:
         """Return what the board does, and what it has counted."""
-        answer = self._ask("state")
-        mode, *words = answer.split()
-        named = dict(word.split("=", 1) for word in words if "=" in word)
-        try:
-            voltage, reading = (self._number(word) for word in words[-2:])
-            counts = {
-                name: int(named[name])
-                for name in ("tick", "left", "recorded", "overruns", "invalid")
-            }
-            return BoardState(
-                mode=mode, fault=named["fault"], voltage=voltage, reading=reading, **counts
-            )
-        except (KeyError, ValueError, struct.error):
-            raise self._unexpected("state", answer) from None
+        return self._line.state()
 
     def exchange(self, volts: float) -> float:
         """Put out a voltage [V] and return the last reading [m]; NaN for none."""
         self._check(finite("volts", volts, "V"))
-        message = f"exchange {self._bits(volts)}"
-        answer = self._ask(message)
+        message = f"exchange {self._line.bits(volts)}"
+        answer = self._line.ask(message)
         try:
-            return self._number(answer)
+            return self._line.number(answer)
         except (ValueError, struct.error):
-            raise self._unexpected(message, answer) from None
+            raise self._line.unexpected(message, answer) from None
 
     def hold(self, volts: float) -> None:
         """Put out a constant voltage [V] from now on."""
         self._check(finite("volts", volts, "V"))
-        self._ask(f"hold {self._bits(volts)}")
+        self._line.ask(f"hold {self._line.bits(volts)}")
 
     def play(self, volts: Array, rate: float, *, lead_in: float = 0.0) -> Record:
         """Play a table and record, on the clock of the board; as `Device.play`.
@@ -240,10 +144,10 @@ class FirmwareDevice:
         dt = self.board.dt
         divider = round(1.0 / (self.rates.nearest(rate) * dt))
         before = round(not_negative("lead_in", lead_in, "s") / dt)
-        self._load("voltage", table)
-        self._ask(f"play {table.size} {divider} {before}")
-        self._wait("hold", (table.size * divider + before) * dt)
-        rows = self._recorded(table.size)
+        self._line.load("voltage", table)
+        self._line.ask(f"play {table.size} {divider} {before}")
+        self._line.wait("hold", (table.size * divider + before) * dt)
+        rows = self._line.recorded(table.size)
         return Record(
             volts=rows[:, 3],
             displacement=rows[:, 4],
@@ -293,11 +197,11 @@ class FirmwareDevice:
         if self.board.takes_voltages:
             planned, note = run.feedforward
             volts = np.clip(planned, *self.limits)
-            self._load("voltage", volts)
-        self._load("reference", x)
-        self._ask(f"run {x.size} 1 {int(self.board.takes_voltages)}")
-        self._wait("run", x.size * self.board.dt)
-        rows = self._recorded(x.size)
+            self._line.load("voltage", volts)
+        self._line.load("reference", x)
+        self._line.ask(f"run {x.size} 1 {int(self.board.takes_voltages)}")
+        self._line.wait("run", x.size * self.board.dt)
+        rows = self._line.recorded(x.size)
         command, y = rows[:, 3], rows[:, 4]
         t = run.samples.t
         return Tracking(
@@ -321,19 +225,19 @@ class FirmwareDevice:
 
     def follow(self, displacement: float) -> None:
         """Keep a displacement [m] in closed loop from now on."""
-        self._ask(f"follow {self._bits(finite('displacement', displacement, 'm'))}")
+        self._line.ask(f"follow {self._line.bits(finite('displacement', displacement, 'm'))}")
 
     def stop(self) -> None:
         """Lead the output to the safe voltage."""
-        self._ask("stop")
-        self._wait("off", 1.0)
+        self._line.ask("stop")
+        self._line.wait("off", 1.0)
 
     def clear(self) -> None:
         """Forget a fault, once the output is at the safe voltage."""
         end = time.monotonic() + PATIENCE
         while self.state().mode == "fault":
             try:
-                self._ask("clear")
+                self._line.ask("clear")
             except DeviceError:
                 if time.monotonic() > end:
                     raise
@@ -360,26 +264,18 @@ class FirmwareDevice:
             )
         self._check_controller(controller)
         values = settings_of(controller, single=self.board.real == 4)
-        self._ask("stage")
+        self._line.ask("stage")
         for place, value in enumerate(values.values()):
-            self._ask(f"set {place} {self._bits(value)}")
-        self._ask("tune")
+            self._line.ask(f"set {place} {self._line.bits(value)}")
+        self._line.ask("tune")
 
     def settings(self) -> dict[str, float]:
         """Return the numbers in use, by their names."""
-        found = {}
-        for place in range(self.board.settings):
-            answer = self._ask(f"setting {place}")
-            try:
-                words = answer.split()
-                found[words[0]] = self._number(words[-4])
-            except (IndexError, ValueError, struct.error):
-                raise self._unexpected("setting", answer) from None
-        return found
+        return self._line.settings()
 
     def save_settings(self) -> None:
         """Keep the numbers in use over a reset, where the board has memory for it."""
-        self._ask("save")
+        self._line.ask("save")
 
     def log(self) -> Dataset:
         """Return the newest samples that the board has kept, as a log."""
@@ -392,7 +288,7 @@ class FirmwareDevice:
         count = min(recorded, self.memory)
         while True:
             try:
-                rows = self._recorded(count, recorded - count)
+                rows = self._line.recorded(count, recorded - count)
                 break
             except DeviceError:
                 # Older ones were overwritten meanwhile: fewer of the newest.
@@ -412,13 +308,11 @@ class FirmwareDevice:
 
         A connection that is lost is a fault, which leads it there too.
         """
-        if not self._closed.is_set():
+        if not self._line.closed:
             with suppress(DeviceError):
                 if self.state().mode != "fault":
                     self.stop()
-        self._closed.set()
-        with self._lock:
-            self._link.close()
+        self._line.close()
 
     def _check_controller(self, controller: Controller) -> None:
         """Refuse a controller that is not that of the firmware but for its settings."""
@@ -446,119 +340,8 @@ class FirmwareDevice:
                 verb="has",
             )  # fmt: skip
 
-    def _identified(self, answer: str) -> Board:
-        words = answer.split()
-        named = dict(word.split("=", 1) for word in words if "=" in word)
-        if words[:2] != ["piezotrack-firmware", "1"]:
-            raise DeviceError(
-                f"{self._link.where} answered 'id' with {shown(answer)}: expected a firmware of "
-                "piezotrack, version 1"
-            )
-        try:
-            real = int(named["real"])
-            low, high, bottom, top = (
-                _number(named[name], real) for name in ("low", "high", "bottom", "top")
-            )
-            return Board(
-                name=named["name"],
-                real=real,
-                dt=_rounded(_number(named["dt"], real), real),
-                limits=(low, high),
-                span=(bottom, top),
-                memory=min(int(named["table"]), int(named["ring"])),
-                divider=int(named["divider"]),
-                settings=int(named["settings"]),
-                layout=int(named["layout"]),
-                takes_voltages=named["voltages"] == "1",
-            )
-        except (KeyError, ValueError, struct.error):
-            raise self._unexpected("id", answer) from None
-
-    def _load(self, table: str, numbers: Array) -> None:
-        for first in range(0, numbers.size, NUMBERS):
-            words = " ".join(map(self._bits, numbers[first : first + NUMBERS].tolist()))
-            self._ask(f"load {table} {first} {words}")
-
-    def _wait(self, mode: str, duration: float) -> None:
-        """Wait until a table has ended."""
-        end = time.monotonic() + duration + PATIENCE
-        while True:
-            state = self.state()
-            if state.mode == "fault":
-                raise DeviceError(
-                    f"{self.channels[0]} has the fault {state.fault!r}: its output goes to the "
-                    "safe voltage; clear() forgets the fault"
-                )
-            if state.mode == mode and state.left == 0:
-                return
-            if time.monotonic() > end:
-                raise DeviceError(
-                    f"{self.channels[0]} is in mode {state.mode!r} with {state.left} samples left: "
-                    f"expected the end of the table after {duration:g} s"
-                )
-            time.sleep(GLANCE)
-
-    def _recorded(self, count: int, first: int = 0) -> Array:
-        """Read samples: tick, flags, reference, voltage, reading."""
-        rows: list[Sequence[float]] = []
-        while len(rows) < count:
-            wanted = min(SAMPLES, count - len(rows))
-            message = f"read {first + len(rows)} {wanted}"
-            answer = self._ask(message)
-            try:
-                more = [
-                    (float(tick), float(flags), *map(self._number, numbers))
-                    for tick, flags, *numbers in (word.split(":") for word in answer.split())
-                ]
-            except (ValueError, struct.error):
-                raise self._unexpected(message, answer) from None
-            if not more or any(len(row) != 5 for row in more):
-                raise self._unexpected(message, answer)
-            rows += more
-        return np.array(rows, dtype=np.float64).reshape(-1, 5)
-
-    def _bits(self, value: float) -> str:
-        return f"x{struct.pack('>f' if self.board.real == 4 else '>d', value).hex()}"
-
-    def _number(self, word: str) -> float:
-        return _number(word, self.board.real)
-
-    def _ask(self, message: str) -> str:
-        with self._lock:
-            if self._closed.is_set():
-                raise DeviceError(f"{self._link.where} is closed")
-            answer = self._link.ask(message)
-        verdict, _, rest = answer.partition(" ")
-        if verdict != "ok":
-            raise DeviceError(
-                f"{self._link.where} answered {shown(message)} with {shown(answer)}: expected ok"
-            )
-        return rest
-
-    def _live(self) -> None:
-        """Give signs of life until the connection is closed or lost."""
-        while not self._closed.wait(ALIVE):
-            # A connection that was lost is made anew, also by this.
-            with suppress(DeviceError):
-                self._ask("ping")
-
-    def _unexpected(self, message: str, answer: str) -> DeviceError:
-        return DeviceError(f"{self._link.where} answered {shown(message)} with {shown(answer)}")
-
     def _check(self, volts: Any) -> None:
         check_within(volts, self.limits, self.channels[0])
-
-
-def _number(word: str, real: int) -> float:
-    """Read the bits of a number."""
-    if not word.startswith("x"):
-        raise ValueError(word)
-    return float(struct.unpack(">f" if real == 4 else ">d", bytes.fromhex(word[1:]))[0])
-
-
-def _rounded(value: float, real: int) -> float:
-    """Return the decimal that a float was rounded from."""
-    return float(f"{value:.7g}") if real == 4 else value
 
 
 def from_address(

@@ -13,12 +13,10 @@ from ... import _core
 from ..._support.arguments import expect
 from ...errors import ParameterError
 from ...stages.virtual import VirtualStage
-from .listening import cannot_listen, checked_port
-from .serving import Server
+from .listening import Listening
 
 if TYPE_CHECKING:
     import socket
-    from types import TracebackType
 
 __all__ = ["Converters"]
 
@@ -43,7 +41,7 @@ class Scale(NamedTuple):
     safe: float
 
 
-class Converters:
+class Converters(Listening):
     """DAC, ADC and clock of a board, with a virtual stage between them.
 
     A firmware built for this computer connects to it, and the second serial port of an emulated
@@ -85,40 +83,12 @@ class Converters:
     ) -> None:
         expect("stage", stage, VirtualStage, "pt.VirtualStage, as VirtualStage.of makes it")
         self._stage = stage
-        self._place = host, checked_port(port)
+        super().__init__(host, port)
         self._speed = _core.as_number("speed", speed)
         if not self._speed > 0.0:
             raise ParameterError("speed", f"{self._speed:g} times real time", "above 0")
-        self._server: Server | None = None
         # The last voltage that the stage got [V], and whether its sensor shows anything.
         self.voltage, self.reads = math.nan, True
-
-    @property
-    def address(self) -> tuple[str, int]:
-        """Host and port."""
-        if self._server is None:
-            return self._place
-        host, port = self._server.server_address[:2]
-        return str(host), port
-
-    def __enter__(self) -> Converters:
-        """Listen, in the background."""
-        try:
-            self._server = Server(self._place, self._converse)
-        except OSError as error:
-            raise cannot_listen(*self._place, error) from None
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """End all connections."""
-        if self._server is not None:
-            self._server.end()
-            self._server = None
 
     def _converse(self, link: socket.socket) -> None:
         scale = _scale_of(link)

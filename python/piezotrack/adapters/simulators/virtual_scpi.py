@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...errors import PiezotrackError
-from .listening import cannot_listen, checked_port
-from .serving import Lines, Server
+from .listening import Listening
+from .serving import Lines
 
 if TYPE_CHECKING:
     import socket
-    from types import TracebackType
 
     from numpy.typing import NDArray
 
@@ -30,7 +29,7 @@ NO_ERROR, UNKNOWN, RANGE = '0,"No error"', '-113,"Undefined header"', '-222,"Dat
 TOO_MUCH, DEADLOCKED = '-223,"Too much data"', '-430,"Query DEADLOCKED"'
 
 
-class VirtualScpi:
+class VirtualScpi(Listening):
     """An instrument in front of a virtual device, for tests and for trying things out.
 
     It knows ``*IDN?``, ``*OPC?``, ``SYST:ERR?``, ``VOLT 12.5``, ``VOLT?``, ``MEAS?`` [um],
@@ -62,38 +61,10 @@ class VirtualScpi:
 
     def __init__(self, device: VirtualDevice, *, host: str = "127.0.0.1", port: int = 0) -> None:
         self.device = device
-        self._place = host, checked_port(port)
+        super().__init__(host, port)
         self._list: list[Array] = []
         self._rate, self._fetched, self._error = 1000.0, "", NO_ERROR
         self._lock = threading.Lock()
-        self._server: Server | None = None
-
-    @property
-    def address(self) -> tuple[str, int]:
-        """Host and port."""
-        if self._server is None:
-            return self._place
-        host, port = self._server.server_address[:2]
-        return str(host), port
-
-    def __enter__(self) -> VirtualScpi:
-        """Listen, in the background."""
-        try:
-            self._server = Server(self._place, self._converse)
-        except OSError as error:
-            raise cannot_listen(*self._place, error) from None
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """End all connections."""
-        if self._server is not None:
-            self._server.end()
-            self._server = None
 
     def serve(self) -> None:
         """Listen until Ctrl-C."""

@@ -1,0 +1,1 @@
+"""Boards with a firmware of this package: their line, and the device."""

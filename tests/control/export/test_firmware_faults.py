@@ -1,0 +1,220 @@
+"""Faults of a firmware: whatever fails, its output goes to the safe voltage."""
+
+from __future__ import annotations
+
+import math
+import socket
+import struct
+import threading
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import piezotrack as pt
+from boards import booted, connected, controller, within
+from c_exports import needs_gcc
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SAFE = 0.0
+
+
+class Clock:
+    """Converters that send what a test says, and keep what is answered [V]."""
+
+    def __init__(self, one: pt.Controller) -> None:
+        low, high = one.limits
+        self._scale = (high - low) / (2**20 - 1)
+        self._socket = socket.create_server(("127.0.0.1", 0))
+        self.address: tuple[str, int] = self._socket.getsockname()[:2]
+        self.status, self.volts, self.going = 0, [math.nan], True
+        self.code = 2**19
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self) -> Clock:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Wait for the board to go, which is killed before."""
+        self._thread.join()
+        self._socket.close()
+
+    def _run(self) -> None:
+        link, _ = self._socket.accept()
+        with link:
+            link.recv(1 + 7 * 8, socket.MSG_WAITALL)
+            while True:
+                while not self.going:
+                    time.sleep(0.001)
+                try:
+                    link.sendall(struct.pack("<IB", self.code, self.status))
+                    answer = link.recv(4, socket.MSG_WAITALL)
+                except OSError:
+                    return
+                if len(answer) < 4:
+                    return
+                self.volts.append(struct.unpack("<I", answer)[0] * self._scale)
+
+
+@needs_gcc
+@pytest.mark.parametrize(
+    ("status", "mode", "fault"), [(1, "hold", "overrun"), (2, "run", "reading")]
+)
+def test_samples_that_are_late_or_have_no_reading_lead_to_the_safe_voltage(
+    status: int, mode: str, fault: str, tmp_path: Path
+) -> None:
+    one = controller()
+    with Clock(one) as clock, booted(one, tmp_path, "host", clock.address) as (address, _):
+        device = connected(address)
+        device.hold(30.0)
+        if mode == "run":
+            device.follow(5e-5)
+        clock.status = status
+        assert within(lambda: device.state().fault == fault)
+        assert within(lambda: clock.volts[-1] == SAFE)
+        # On the way there no step is larger than that of half a second over the range.
+        steps = np.abs(np.diff(clock.volts))
+        way = steps[np.flatnonzero(steps > 0.0)[-100:]]
+        assert 0.14 < way.max() < 0.16
+        clock.status = 0
+        device.clear()
+        assert device.state().mode == "off"
+        device.close()
+
+
+@needs_gcc
+def test_samples_that_do_not_come_are_a_fault(tmp_path: Path) -> None:
+    one = controller()
+    pt.control.export_controller(one, tmp_path, to="firmware", name="axis")
+    text = (tmp_path / "Makefile").read_text().replace("CFLAGS +=", "CFLAGS :=")
+    (tmp_path / "Makefile").write_text(text)
+    with Clock(one) as clock, booted(one, tmp_path, "host", clock.address) as (address, _):
+        device = connected(address)
+        device.hold(30.0)
+        clock.going = False
+        assert within(lambda: device.state().fault == "sampling")
+        clock.going = True
+        assert within(lambda: clock.volts[-1] == SAFE)
+        device.clear()
+        # Also on the way to the safe voltage.
+        device.hold(70.0)
+        assert within(lambda: clock.volts[-1] > 69.0)
+        device._line.ask("stop")
+        clock.going = False
+        assert within(lambda: device.state().fault == "sampling")
+        assert device.voltage == SAFE
+        clock.going = True
+        assert within(lambda: clock.volts[-1] == SAFE)
+        device.close()
+
+
+@needs_gcc
+def test_a_second_reference_begins_from_the_voltage_that_is_there(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    one = controller(filters=[])
+    with booted(one, tmp_path, "host", stage.address) as (address, _):
+        device = connected(address)
+        first = device.track(one, "triangle:2Hz,5..10um,0.5s")
+        with pytest.raises(pt.DeviceError, match="in use"):
+            device._line.load("voltage", np.full(10, 70.0))
+        second = device.track(one, "triangle:2Hz,70..90um,0.5s")
+        device.close()
+    assert abs(second.voltage[0] - first.voltage[-1]) < 1.0
+    # The PID alone answers the step of the reference.
+    assert np.abs(np.diff(second.voltage)).max() < 3.0
+
+
+@needs_gcc
+@pytest.mark.parametrize("code", [0, 2**20 - 1])
+def test_a_sensor_at_an_end_of_its_range_gives_no_reading(code: int, tmp_path: Path) -> None:
+    one = controller()
+    with Clock(one) as clock, booted(one, tmp_path, "host", clock.address) as (address, _):
+        device = connected(address)
+        device.follow(4e-5)
+        clock.code = code
+        assert within(lambda: device.state().fault == "reading")
+        assert within(lambda: clock.volts[-1] == SAFE)
+        device.close()
+
+
+@needs_gcc
+def test_half_a_line_is_not_that_of_the_next_client(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    with booted(controller(), tmp_path, "host", stage.address) as (address, _):
+        host, port = address.removeprefix("firmware://").split(":")
+        with socket.create_connection((host, int(port))) as link:
+            link.sendall(b"hold 7")
+            time.sleep(0.1)
+        with socket.create_connection((host, int(port))) as link, link.makefile("rw") as lines:
+            lines.write("5\n")
+            lines.flush()
+            assert lines.readline().startswith("error command")
+
+
+@needs_gcc
+def test_a_client_that_does_not_read_is_hung_up_on(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    with booted(controller(), tmp_path, "host", stage.address) as (address, _):
+        host, port = address.removeprefix("firmware://").split(":")
+        with socket.create_connection((host, int(port))) as link:
+            link.sendall(b"hold 60\n")
+            assert within(lambda: stage.voltage > 59.9)
+            link.settimeout(0.5)
+            with suppress(OSError):
+                for _ in range(100_000):
+                    link.sendall(b"read 0 256\n")
+            assert within(lambda: stage.voltage == SAFE)
+
+
+@needs_gcc
+def test_lines_that_make_no_sense_are_answered(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    with booted(controller(), tmp_path, "host", stage.address) as (address, process):
+        host, port = address.removeprefix("firmware://").split(":")
+        with socket.create_connection((host, int(port))) as link, link.makefile("rw") as lines:
+            for line, answer in {
+                "ping": "ok",
+                "": "error command",
+                "hold": "error hold",
+                "hold 75.1": "error hold",
+                "hold nan": "error hold",
+                "hold 1e9999999999": "error hold",
+                "hold x7ff8000000000000": "error hold",
+                "hold 1.25e1": "ok",
+                "load voltage 4096 1": "error table",
+                "load voltage 4000 " + "1 " * 49: "error number",
+                "load sideways 0 1": "error table",
+                "load voltage 0 -0.001": "error table",
+                "load voltage 4294967295 1 2": "error table",
+                "play 0 1 0": "error play",
+                "play 4097 1 0": "error play",
+                "play 2 1 4294967295": "error play",
+                "play 99999999999 1 0": "error play",
+                "run 1 1 2": "error run",
+                "read 0 257": "error samples",
+                "clear": "error clear",
+                "tune": "error tune",
+                "follow 1": "error follow",
+                "load reference 0 1e300": "error table",
+                "stage": "ok",
+                "set 99 1": "error set",
+                "set 0": "error set",
+                "set 0 1e30": "ok",
+                "tune ": "error tune",
+                "setting 99": "error setting",
+                "x" * 2000: "error line",
+                "ping ": "ok",
+            }.items():
+                lines.write(f"{line}\n")
+                lines.flush()
+                assert lines.readline().startswith(answer), line
+        assert process.poll() is None
