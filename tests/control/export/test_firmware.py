@@ -234,6 +234,20 @@ def test_gains_change_while_it_runs_as_those_of_a_session(
 
 
 @needs_gcc
+def test_a_limit_that_a_float_cannot_have_is_reached(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    """The float nearest to 3.6 V is below it."""
+    one = controller(limits=(0.0, 3.6))
+    with booted(one, tmp_path, "host", stage.address, single=True) as (address, _):
+        device = connected(address)
+        assert device.limits == (0.0, 3.6)
+        log = pt.measure(device, "decaying:5Hz,0..3.6V,1s", rate=500.0)
+        device.close()
+    assert log.u.max() == pytest.approx(3.6, rel=1e-7)
+
+
+@needs_gcc
 def test_numbers_that_are_fixed_cannot_be_changed(
     tmp_path: Path, stage: pt.hardware.Converters
 ) -> None:

@@ -259,13 +259,14 @@ class BoardLine:
             )
         try:
             real = int(named["real"])
-            low, high, bottom, top = (
-                _number(named[name], real) for name in ("low", "high", "bottom", "top")
+            dt, low, high, bottom, top = (
+                _rounded(_number(named[name], real), real)
+                for name in ("dt", "low", "high", "bottom", "top")
             )
             return Board(
                 name=named["name"],
                 real=real,
-                dt=_rounded(_number(named["dt"], real), real),
+                dt=dt,
                 limits=(low, high),
                 span=(bottom, top),
                 memory=min(int(named["table"]), int(named["ring"])),
