@@ -20,6 +20,7 @@ __all__ = [
     "LeastSquaresFit",
     "LocalFit",
     "LoopPlant",
+    "ModalFit",
     "ModalSystem",
     "Objective",
     "PathTask",
@@ -37,10 +38,12 @@ __all__ = [
     "VirtualStage",
     "XYStage",
     "__version__",
+    "aligned_terms",
     "as_count",
     "as_number",
     "as_truth",
     "autoregression",
+    "balanced_terms",
     "bounded_least_squares",
     "check_loop",
     "check_margins",
@@ -545,6 +548,22 @@ class ModalSystem:
         signals: tuple[ArrayLike, ArrayLike, ArrayLike],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 
+_Array = NDArray[np.float64]
+_Terms = tuple[int, int, _Parts, _Parts, _Parts, ArrayLike]
+_FoundTerms = tuple[tuple[_Array, _Array], tuple[_Array, _Array], tuple[_Array, _Array], _Array]
+
+@final
+class ModalFit:
+    def __new__(
+        cls, drives: int, sensors: int, angles: ArrayLike, value: _Parts, weights: ArrayLike
+    ) -> ModalFit: ...
+    def pursue(self, expected: float, most: int, fixed: bool) -> _FoundTerms: ...
+    def refine(self, start: _Terms, held: float) -> _FoundTerms: ...
+    def misfit(self, at: _Terms) -> float: ...
+    def pole_deviations(self, at: _Terms, variance: ArrayLike) -> tuple[_Array, _Array]: ...
+
+def balanced_terms(given: _Terms) -> _FoundTerms: ...
+def aligned_terms(given: _Terms, other: _Terms) -> _FoundTerms: ...
 def circle_errors(
     x: ArrayLike, y: ArrayLike, centre: tuple[float, float], radius: float
 ) -> NDArray[np.float64]: ...

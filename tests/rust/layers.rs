@@ -23,7 +23,8 @@ const CORE: [&str; 10] = [
 ];
 
 /// The rooms of `identify`, from the bottom up.
-const IDENTIFY: [&str; 12] = [
+const IDENTIFY: [&str; 13] = [
+    "modes",
     "swarm",
     "records",
     "parameters",

@@ -12,10 +12,9 @@ from .._support.arguments import expect, has_entries
 from .._support.messages import quoted
 from ..errors import DataError, ParameterError
 from .approximation import MultiAxisResponse, approximate_axes
-from .gauss_newton import Target, pole_deviations, refine
 from .modal_model import AxesLevel, MultiAxisModel
-from .pursuit import LAST_STEPS, LAST_TOLERANCE, pursue
 from .record import MultiAxisRecord, check_same
+from .target import Target
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -113,17 +112,15 @@ def identify_axes(
         _check_lines(response, modes)
     middle = len(records) // 2
     scale = float(np.sqrt(np.mean(np.square(np.abs(responses[middle].value)))))
-    target = _target(responses[middle], scale, VARIANCE)
-    expected = _expected(responses[middle], scale, target)
-    start = pursue(target, expected, modes, fixed=states is not None).terms
-    power = VARIANCE if target.misfit(start)[0] < DESCRIBED * expected else 0.0
-    targets = [_target(response, scale, power) for response in responses]
-    found = {middle: refine(targets[middle], start, LAST_STEPS, LAST_TOLERANCE)[0]}
+    target = Target(responses[middle], scale, VARIANCE)
+    start = target.pursue(modes, fixed=states is not None)
+    power = VARIANCE if target.misfit(start) < DESCRIBED * target.expected else 0.0
+    targets = [Target(response, scale, power) for response in responses]
+    found = {middle: targets[middle].refine(start)}
     # Outwards from the middle, each level from the one beside it.
     for k in [*range(middle - 1, -1, -1), *range(middle + 1, len(records))]:
         start = found[k + 1] if k < middle else found[k - 1]
-        held = HELD * _expected(responses[k], scale, targets[k]) / (2 * targets[k].value.size)
-        found[k], _, _ = refine(targets[k], start, LAST_STEPS, LAST_TOLERANCE, held=held)
+        found[k] = targets[k].refine(start, held=HELD)
     levels = tuple(
         _level(response, targets[k], found[k], scale) for k, response in enumerate(responses)
     )
@@ -165,32 +162,19 @@ def _check_lines(response: MultiAxisResponse, modes: int) -> None:
         )
 
 
-def _target(response: MultiAxisResponse, scale: float, power: float) -> Target:
-    """Return a response in a unit, weighted by drives and by a power of the inverse variance."""
-    weight = response.power * response.variance.mean(axis=(1, 2)) ** -power
-    return Target(response.z, response.value / scale, weight / weight.mean())
-
-
-def _expected(response: MultiAxisResponse, scale: float, target: Target) -> float:
-    """Return the weighted sum of squared errors that noise and distortion make expected."""
-    return float(np.einsum("k,kij->", target.weight, response.variance)) / scale**2
-
-
 def _level(
     response: MultiAxisResponse, target: Target, terms: ModalTerms, scale: float
 ) -> AxesLevel:
-    decay_sd, angle_sd = pole_deviations(target, terms, response.variance / scale**2)
+    decay_sd, angle_sd = target.pole_deviations(terms)
     # Errors are those of the displacement, whichever weights were used.
-    plain = _target(response, scale, 0.0)
-    cost, _ = plain.misfit(terms)
-    size = float(np.einsum("k,kij->", plain.weight, np.square(np.abs(plain.value))))
+    plain = Target(response, scale, 0.0)
     return AxesLevel(
         level=response.level,
         terms=terms.scaled(scale).balanced(),
         decay_sd=decay_sd,
         angle_sd=angle_sd,
-        misfit=float(np.sqrt(cost / size)),
-        expected=float(np.sqrt(_expected(response, scale, plain) / size)),
+        misfit=float(np.sqrt(plain.misfit(terms) / plain.size)),
+        expected=float(np.sqrt(plain.expected / plain.size)),
         drive_mean=response.drive_mean,
         output_mean=response.output_mean,
     )

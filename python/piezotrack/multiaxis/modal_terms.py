@@ -15,12 +15,14 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Complex = NDArray[np.complex128]
+    Pair = tuple[Array, Array]
+    Found = tuple[Pair, Pair, Pair, Array]
+    Parts = tuple[int, int, Pair, Pair, Pair, Array]
 
 __all__ = ["ModalTerms"]
 
 # Overlap of two shapes from which they are one mode; damping ratio from which a pole is none.
 ALIKE, DAMPED = 0.5, 0.3
-TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,26 @@ class ModalTerms:
     outputs: Complex
     direct: Array
 
+    @classmethod
+    def _of(cls, found: Found) -> ModalTerms:
+        """Return the terms that the compiled core gives."""
+        poles, inputs, outputs = (real + 1j * imaginary for real, imaginary in found[:3])
+        return cls(
+            poles,
+            inputs.reshape(poles.size, -1),
+            outputs.reshape(poles.size, -1),
+            found[3].reshape(outputs.size // poles.size, -1),
+        )
+
+    def _parts(self) -> Parts:
+        """Return the terms as the compiled core takes them."""
+        sensors, drives = self.direct.shape
+        poles, inputs, outputs = (
+            (part.real.ravel(), part.imag.ravel())
+            for part in (self.poles, self.inputs, self.outputs)
+        )
+        return drives, sensors, poles, inputs, outputs, self.direct.ravel()
+
     @property
     def residues(self) -> Complex:
         """Matrices c b^T of the modes, shape (q, sensors, drives)."""
@@ -55,20 +77,15 @@ class ModalTerms:
     def response(self, z: Complex) -> Complex:
         """Return the response at points z, shape (points, sensors, drives)."""
         residues = self.residues
-        found = np.tensordot(1.0 / (z[:, np.newaxis] - self.poles), residues, 1)
-        found += np.tensordot(1.0 / (z[:, np.newaxis] - self.poles.conj()), residues.conj(), 1)
+        points = z[:, np.newaxis]
+        # Sums of einsum have one order, those of matrix products another for each thread count.
+        found = np.einsum("kq,qij->kij", 1.0 / (points - self.poles), residues)
+        found += np.einsum("kq,qij->kij", 1.0 / (points - self.poles.conj()), residues.conj())
         return np.asarray(found + self.direct)
 
     def balanced(self) -> ModalTerms:
         """Return the same with b and c of equal size, the largest b real, and poles above."""
-        below = self.poles.imag < 0.0
-        poles = np.where(below, self.poles.conj(), self.poles)
-        b = np.where(below[:, np.newaxis], self.inputs.conj(), self.inputs)
-        c = np.where(below[:, np.newaxis], self.outputs.conj(), self.outputs)
-        size = np.linalg.norm(b, axis=1)
-        largest = b[np.arange(poles.size), np.abs(b).argmax(axis=1)]
-        factor = np.sqrt(np.linalg.norm(c, axis=1) / size) * np.abs(largest) / largest
-        return ModalTerms(poles, b * factor[:, np.newaxis], c / factor[:, np.newaxis], self.direct)
+        return ModalTerms._of(_core.balanced_terms(self._parts()))
 
     def scaled(self, factor: float) -> ModalTerms:
         """Return the terms of a response that is larger by a factor."""
@@ -76,11 +93,8 @@ class ModalTerms:
 
     def aligned(self, other: ModalTerms) -> tuple[Complex, Complex]:
         """Return b and c, turned and sized so that b is as near to that of others as it can."""
-        overlap = np.sum(self.inputs.conj() * other.inputs, axis=1)
-        size = np.linalg.norm(other.inputs, axis=1) / np.linalg.norm(self.inputs, axis=1)
-        turn = np.where(overlap == 0.0, 1.0, overlap / np.maximum(np.abs(overlap), TINY))
-        turn = (turn * size)[:, np.newaxis]
-        return self.inputs * turn, self.outputs / turn
+        turned = ModalTerms._of(_core.aligned_terms(self._parts(), other._parts()))
+        return turned.inputs, turned.outputs
 
     def between(self, other: ModalTerms, share: float) -> ModalTerms:
         """Return the terms a share of the way to others with the same modes.
@@ -124,12 +138,7 @@ class ModalTerms:
     @cached_property
     def core(self) -> _core.ModalSystem:
         """The system in the compiled core, which simulates it."""
-        sensors, drives = self.direct.shape
-        poles, inputs, outputs = (
-            (part.real.ravel(), part.imag.ravel())
-            for part in (self.poles, self.inputs, self.outputs)
-        )
-        return _core.ModalSystem(drives, sensors, poles, inputs, outputs, self.direct.ravel())
+        return _core.ModalSystem(*self._parts())
 
     def simulate(self, drive: Array, state: Complex) -> tuple[Array, Complex]:
         """Return outputs, shape (samples, sensors), and the state after a drive from a state."""

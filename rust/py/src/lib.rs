@@ -33,5 +33,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     control::tracking::register(module)?;
     tune::register(module)?;
     stages::xy::register(module)?;
-    stages::modal_system::register(module)
+    stages::modal_system::register(module)?;
+    stages::modal_fit::register(module)
 }

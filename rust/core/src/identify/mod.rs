@@ -7,6 +7,7 @@ mod identification;
 mod inference;
 mod intervals;
 mod least_squares;
+mod modes;
 mod parameters;
 mod problem;
 mod records;
@@ -32,6 +33,7 @@ pub use least_squares::{
     CreepKind, DynamicsKind, LeastSquaresFit, NodesKind, RecordFit, Settings as WeightsSettings,
     Structure, WeightsDelay, WeightsRecord, identify_weights,
 };
+pub use modes::{Descent, ModalFit, ModalTerms};
 pub use parameters::bounds;
 pub use parameters::candidate::{
     BEFORE, Candidate, DELAY, DRIFT_TIME, ITS_OWN, PLACES, Point, Theta,

@@ -21,6 +21,8 @@ pub use amplifier::{Amplifier, AmplifierFlow};
 pub use apparatus::{Apparatus, ApparatusState};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use modal_system::{AxesLoop, AxesRun, ModalState, ModalSystem};
+
+pub(crate) use modal_system::check_modes;
 pub use open_loop::{OpenLoop, open_loop};
 pub use sensor::{Sensor, SensorState};
 pub use timing::{MissedTicks, Timing};

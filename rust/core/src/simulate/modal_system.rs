@@ -83,6 +83,35 @@ fn sized(name: &str, found: usize, expected: usize) -> Result<()> {
     })
 }
 
+/// Refuses modes whose lists do not fit each other, that are not stable or not finite.
+///
+/// # Errors
+/// As of [`ModalSystem::new`].
+pub(crate) fn check_modes(
+    [drives, sensors]: [usize; 2],
+    poles: &[[f64; 2]],
+    inputs: &[[f64; 2]],
+    outputs: &[[f64; 2]],
+    direct: &[f64],
+) -> Result<()> {
+    let count = poles.len();
+    sized("inputs", inputs.len(), count.saturating_mul(drives))?;
+    sized("outputs", outputs.len(), count.saturating_mul(sensors))?;
+    sized("direct", direct.len(), sensors.saturating_mul(drives))?;
+    for [real, imaginary] in poles {
+        let size = real * real + imaginary * imaginary;
+        if size.is_nan() || size >= 1.0 {
+            let value = format!("{real} + {imaginary}i");
+            return Err(Error::parameter("poles", value, "poles inside the unit circle"));
+        }
+    }
+    let all = inputs.iter().chain(outputs).flatten().chain(direct);
+    if let Some(value) = all.into_iter().find(|value| !value.is_finite()) {
+        return Err(Error::parameter("inputs, outputs or direct", value, "finite numbers"));
+    }
+    Ok(())
+}
+
 impl ModalSystem {
     /// A system of `[drives, sensors]` with these poles, b of each mode, c of each mode, and D
     /// sensor by sensor; complex numbers as real and imaginary part.
@@ -97,21 +126,7 @@ impl ModalSystem {
         outputs: &[[f64; 2]],
         direct: &[f64],
     ) -> Result<Self> {
-        let count = poles.len();
-        sized("inputs", inputs.len(), count.saturating_mul(drives))?;
-        sized("outputs", outputs.len(), count.saturating_mul(sensors))?;
-        sized("direct", direct.len(), sensors.saturating_mul(drives))?;
-        for [real, imaginary] in poles {
-            let size = real * real + imaginary * imaginary;
-            if size.is_nan() || size >= 1.0 {
-                let value = format!("{real} + {imaginary}i");
-                return Err(Error::parameter("poles", value, "poles inside the unit circle"));
-            }
-        }
-        let all = inputs.iter().chain(outputs).flatten().chain(direct);
-        if let Some(value) = all.into_iter().find(|value| !value.is_finite()) {
-            return Err(Error::parameter("inputs, outputs or direct", value, "finite numbers"));
-        }
+        check_modes([drives, sensors], poles, inputs, outputs, direct)?;
         // Mode after mode in memory, for each drive and sensor.
         let turned = |entries: &[[f64; 2]], width: usize, part: usize, factor: f64| {
             let mut found = room("the modes", entries.len())?;

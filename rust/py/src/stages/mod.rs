@@ -1,6 +1,7 @@
 //! Models, stages, their inverses, and virtual stages on one axis, two and several.
 
 pub mod inverse;
+pub mod modal_fit;
 pub mod modal_system;
 pub mod models;
 pub mod stage;

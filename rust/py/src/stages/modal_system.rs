@@ -15,7 +15,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 }
 
 /// Real and imaginary parts, each as an array.
-type Parts<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
+pub(super) type Parts<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
 
 /// Outputs, and real and imaginary parts of the state after them.
 type Simulated<'py> =
@@ -34,7 +34,7 @@ type Gains = (f64, f64, f64, Option<f64>);
 #[pyclass(name = "ModalSystem", frozen, module = "piezotrack._core")]
 struct PyModalSystem(ModalSystem);
 
-fn complex(name: &str, (real, imaginary): &Parts<'_>) -> PyResult<Vec<[f64; 2]>> {
+pub(super) fn complex(name: &str, (real, imaginary): &Parts<'_>) -> PyResult<Vec<[f64; 2]>> {
     let (real, imaginary) = (samples(name, real)?, samples(name, imaginary)?);
     if real.len() != imaginary.len() {
         return Err(raise(&Error::Shape {
