@@ -24,6 +24,7 @@ __all__ = [
     "ModalSystem",
     "Objective",
     "PathTask",
+    "Regressors",
     "Response",
     "Search",
     "Session",
@@ -48,6 +49,7 @@ __all__ = [
     "check_loop",
     "check_margins",
     "check_part",
+    "choose_distortion",
     "circle_errors",
     "cross_talk_share",
     "delayed",
@@ -562,6 +564,24 @@ class ModalFit:
     def misfit(self, at: _Terms) -> float: ...
     def pole_deviations(self, at: _Terms, variance: ArrayLike) -> tuple[_Array, _Array]: ...
 
+@final
+class Regressors:
+    def __new__(
+        cls,
+        drives: int,
+        sensors: int,
+        matrix: ArrayLike,
+        products: Sequence[Sequence[int]],
+        stops: Sequence[tuple[int, float]],
+        changes: Sequence[tuple[int, float]],
+    ) -> Regressors: ...
+    def follow(
+        self, drives: ArrayLike, displacements: ArrayLike, state: _Parts | None = None
+    ) -> tuple[_Array, _Array, _Array]: ...
+
+def choose_distortion(
+    levels: Sequence[tuple[_Terms, ArrayLike, _Parts, _Parts, ArrayLike]], drives: int
+) -> tuple[list[list[int]], list[list[list[float]]], list[float]]: ...
 def balanced_terms(given: _Terms) -> _FoundTerms: ...
 def aligned_terms(given: _Terms, other: _Terms) -> _FoundTerms: ...
 def circle_errors(

@@ -203,7 +203,7 @@ def test_a_file_gives_back_every_bit(model: MultiAxisModel, tmp_path: Path) -> N
         (lambda m: m.simulate(np.ones((5, 2))), pt.ShapeError, r"samples x 3 drives"),
         (lambda m: m.simulate([[np.nan, 0, 0]]), pt.DataError, r"u\[0, 0\] is nan"),
         (lambda m: m.simulate(np.eye(3), start="moving"), pt.ParameterError, "start is 'moving'"),
-        (lambda m: m.simulate(np.eye(3), start=[1.0]), pt.ShapeError, "expected 5 modes"),
+        (lambda m: m.simulate(np.eye(3), start=[1.0]), pt.ShapeError, "expected 5 entries"),
         (lambda m: m.at(-1.0), pt.ParameterError, "level is -1"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from .._support.arguments import expect, has_entries
 from .._support.messages import quoted
 from ..errors import DataError, ParameterError
 from .approximation import MultiAxisResponse, approximate_axes
+from .distortion import Regressors, choose_distortion
 from .modal_model import AxesLevel, MultiAxisModel
 from .record import MultiAxisRecord, check_same
 from .target import Target
@@ -42,6 +44,7 @@ def identify_axes(
     *,
     states: int | None = None,
     most: int = CAP,
+    distortion: bool = True,
 ) -> MultiAxisModel:
     """Identify the modes of a stage of several axes.
 
@@ -61,6 +64,8 @@ def identify_axes(
         10.1214/aos/1176344136), with twice its penalty.
     most : int, optional
         Most states where they are chosen.
+    distortion : bool, optional
+        Whether nonlinear functions of drives and elongations are sought that act on the modes.
 
     Returns
     -------
@@ -124,6 +129,14 @@ def identify_axes(
     levels = tuple(
         _level(response, targets[k], found[k], scale) for k, response in enumerate(responses)
     )
+    regressors = Regressors()
+    if _core.as_truth("distortion", distortion):
+        linear = [one.terms for one in levels]
+        regressors, forced, shares = choose_distortion(records, responses, linear)
+        levels = tuple(
+            replace(one, terms=terms, distorted=left)
+            for one, terms, left in zip(levels, forced, shares, strict=True)
+        )
     notes = []
     for one, response in zip(levels, responses, strict=True):
         label = f"{one.level:.3g} {records[0].drive_unit}: " if len(levels) > 1 else ""
@@ -138,6 +151,7 @@ def identify_axes(
         dt=records[0].dt,
         drive_unit=records[0].drive_unit,
         output_unit=records[0].output_unit,
+        regressors=regressors,
         responses=tuple(responses),
         source=records[0].source,
         notes=tuple(notes),

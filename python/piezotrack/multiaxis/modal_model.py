@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from .._support.display.result import Result
 from .._support.files.writing import write_result
 from .._support.messages import quoted
 from ..errors import DataError, ParameterError, ShapeError
+from .distortion import Regressors, simulate_distorted
 from .record import MultiAxisRecord, check_skip, relative_error
 
 if TYPE_CHECKING:
@@ -68,6 +69,8 @@ class AxesLevel:
         The same as noise and distortion make it expected.
     drive_mean, output_mean : ndarray, shape (drives,) and (sensors,)
         Operating point [V] and [m].
+    distorted : float
+        Rms of what modes and distortion leave of the record, relative to what the modes leave.
     """
 
     level: float
@@ -78,6 +81,7 @@ class AxesLevel:
     expected: float
     drive_mean: Array
     output_mean: Array
+    distorted: float = 1.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -91,7 +95,9 @@ class MultiAxisModel(Result):
     interpolated linearly in the square root of the level, the root mean square of the drives;
     below the least level and above the largest they are those of that level. A term that is
     strongly damped or has another shape at both levels is no mode that moved: it is taken from
-    both, by their shares.
+    both, by their shares. Nonlinear functions of the drives and of the linear motion act on the
+    modes beside; their distortion has no part that is linear in the drives, and responses, gains
+    and modes are those of the best linear approximation.
 
     Attributes
     ----------
@@ -101,6 +107,8 @@ class MultiAxisModel(Result):
         Sampling interval [s].
     drive_unit, output_unit : str
         Units of the drives and of what the sensors read.
+    regressors : Regressors
+        Nonlinear functions that act on the modes; none where the records show no distortion.
     responses : tuple of MultiAxisResponse
         The measured responses; none where the model was read from a file.
     source : str or None
@@ -118,6 +126,7 @@ class MultiAxisModel(Result):
     dt: float
     drive_unit: str = "V"
     output_unit: str = "m"
+    regressors: Regressors = field(default_factory=Regressors)
     responses: tuple[MultiAxisResponse, ...] = ()
     source: str | None = None
     notes: tuple[str, ...] = ()
@@ -260,10 +269,13 @@ class MultiAxisModel(Result):
         about = (1.0 - share) * lower.drive_mean + share * upper.drive_mean
         offset = (1.0 - share) * lower.output_mean + share * upper.output_mean
         moved = np.ascontiguousarray(drive - about)
+        modes, memory = terms.poles.size, 0
+        if self.regressors:
+            memory = modes + 2 * self.drives + len(self.regressors)
         if isinstance(start, str):
             one_of("start", start, STARTS)
-            state = np.zeros(terms.poles.size, dtype=np.complex128)
-            if start == "periodic":
+            state = np.zeros(modes + memory, dtype=np.complex128)
+            if start == "periodic" and not self.regressors:
                 state = terms.steady(moved)
         else:
             try:
@@ -272,9 +284,15 @@ class MultiAxisModel(Result):
                 raise ParameterError(
                     "start", quoted(start), "'rest', 'periodic' or a state"
                 ) from None
-            if state.shape != terms.poles.shape:
-                raise ShapeError("start", f"the shape {state.shape}", f"{terms.poles.size} modes")
-        y, last = terms.simulate(moved, state)
+            if state.shape != (modes + memory,):
+                raise ShapeError("start", f"the shape {state.shape}", f"{modes + memory} entries")
+        if not self.regressors:
+            y, last = terms.simulate(moved, state)
+            return MultiAxisMotion(y + offset, last)
+        # Below the least level products shrink; above the largest they keep their share.
+        size = max(self.levels[0].level, lower.level if level is None else level)
+        periodic = isinstance(start, str) and start == "periodic"
+        y, last = simulate_distorted(terms, self.regressors, size, moved, state, periodic=periodic)
         return MultiAxisMotion(y + offset, last)
 
     def score(self, record: MultiAxisRecord, *, skip: int = 100, start: str = "periodic") -> Array:
@@ -337,6 +355,11 @@ class MultiAxisModel(Result):
             "output_unit": self.output_unit,
             "dt_s": self.dt,
             "levels": [_level_document(one) for one in self.levels],
+            "regressors": {
+                "products": [list(one) for one in self.regressors.products],
+                "stops": [list(one) for one in self.regressors.stops],
+                "changes": [list(one) for one in self.regressors.changes],
+            },
             "source": self.source,
             "notes": list(self.notes),
             "provenance": {"package": "piezotrack", "version": _core.__version__},
@@ -410,7 +433,7 @@ def _level_document(one: AxesLevel) -> dict[str, Any]:
     terms = one.terms
     parts = {
         f"{name}_{part}": getattr(getattr(terms, name), short).tolist()
-        for name in ("poles", "inputs", "outputs")
+        for name in ("poles", "inputs", "outputs", "forces")
         for part, short in (("real", "real"), ("imaginary", "imag"))
     }
     return {
@@ -423,4 +446,5 @@ def _level_document(one: AxesLevel) -> dict[str, Any]:
         "expected_misfit": one.expected,
         "drive_mean": one.drive_mean.tolist(),
         "output_mean": one.output_mean.tolist(),
+        "distorted": one.distorted,
     }

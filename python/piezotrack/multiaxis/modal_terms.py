@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -42,12 +42,15 @@ class ModalTerms:
         c [m/V].
     direct : ndarray, shape (sensors, drives)
         D [m/V].
+    forces : ndarray of complex, shape (q, drives + regressors)
+        e of the distortion, as of `choose_distortion`; no columns where there is none.
     """
 
     poles: Complex
     inputs: Complex
     outputs: Complex
     direct: Array
+    forces: Complex = field(default_factory=lambda: np.zeros((0, 0), dtype=np.complex128))
 
     @classmethod
     def _of(cls, found: Found) -> ModalTerms:
@@ -89,7 +92,7 @@ class ModalTerms:
 
     def scaled(self, factor: float) -> ModalTerms:
         """Return the terms of a response that is larger by a factor."""
-        return ModalTerms(self.poles, self.inputs, factor * self.outputs, factor * self.direct)
+        return replace(self, outputs=factor * self.outputs, direct=factor * self.direct)
 
     def aligned(self, other: ModalTerms) -> tuple[Complex, Complex]:
         """Return b and c, turned and sized so that b is as near to that of others as it can."""
@@ -99,10 +102,14 @@ class ModalTerms:
     def between(self, other: ModalTerms, share: float) -> ModalTerms:
         """Return the terms a share of the way to others with the same modes.
 
-        Logarithms of the poles, b, c and D are interpolated, b and c of `other` as of `aligned`. A
-        term that is strongly damped or has another shape in both
-        is no mode that moved: it is taken from both, by their shares.
+        Logarithms of the poles, b, c, D and e are interpolated, b and c of `other` as of `aligned`.
+        A term that is strongly damped or has another shape in both is no mode that moved: it is
+        taken from both, by their shares.
         """
+
+        def mixed(first: Complex, second: Complex) -> Complex:
+            return np.asarray((1.0 - share) * first + share * second)
+
         overlap = np.sum(other.inputs.conj() * self.inputs, axis=1)
         crossed = np.abs(np.sum(other.outputs.conj() * self.outputs, axis=1) * overlap)
         mine, theirs = (_residue_sizes(one) for one in (self, other))
@@ -110,11 +117,16 @@ class ModalTerms:
         for one in (self, other):
             logarithm = np.log(one.poles)
             same &= -logarithm.real < DAMPED * np.abs(logarithm)
-        b, c = (part[same] for part in other.aligned(self))
+        turned = other.aligned(self)
+        b, c = (part[same] for part in turned)
         rest = ~same
-
-        def mixed(first: Complex, second: Complex) -> Complex:
-            return np.asarray((1.0 - share) * first + share * second)
+        forces = self.forces
+        if forces.size:
+            # e changes with b.
+            turn = np.sum(other.inputs.conj() * turned[0], axis=1)
+            turn /= np.sum(np.square(np.abs(other.inputs)), axis=1)
+            e = (turn[:, np.newaxis] * other.forces)[same]
+            forces = np.concatenate([mixed(forces[same], e), forces[rest], other.forces[rest]])
 
         return ModalTerms(
             np.concatenate(
@@ -133,7 +145,14 @@ class ModalTerms:
                 ]
             ),
             (1.0 - share) * self.direct + share * other.direct,
+            forces,
         )
+
+    @cached_property
+    def forced(self) -> ModalTerms:
+        """The modes that the distortion moves, with drives and regressors as their drives."""
+        direct = np.zeros((self.outputs.shape[1], self.forces.shape[1]))
+        return ModalTerms(self.poles, self.forces, self.outputs, direct)
 
     @cached_property
     def core(self) -> _core.ModalSystem:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from .. import _core
 from .._support.messages import quoted
 from ..errors import ParameterError, ShapeError
 from ..identification.fitted.model_file import checked_content, entries_of
+from .distortion import Regressors
 from .modal_model import FORMAT, SCHEMA_VERSION, AxesLevel, MultiAxisModel
 from .modal_terms import ModalTerms
 
@@ -67,6 +69,7 @@ def load_axes(path: str | os.PathLike[str]) -> MultiAxisModel:
             raise ParameterError("levels", quoted(sizes), "rising numbers above 0")
         return MultiAxisModel(
             levels=levels,
+            regressors=_regressors(document["regressors"], levels),
             dt=_core.as_number("dt_s", document["dt_s"]),
             drive_unit=document["drive_unit"],
             output_unit=document["output_unit"],
@@ -85,7 +88,12 @@ def _level(entry: dict[str, Any]) -> AxesLevel:
             raise ShapeError(
                 name, f"the shape {getattr(terms, name).shape}", f"{poles.size} x {width}"
             )
-    _ = terms.core
+    if entry["forces_real"]:
+        forces = _complex(entry, "forces", 2)
+        if forces.shape[0] != poles.size:
+            raise ShapeError("forces", f"{forces.shape[0]} rows", f"{poles.size}")
+        terms = replace(terms, forces=forces)
+    _ = terms.core, terms.forced.core
     means = {
         name: _sized(_array(entry, name, 1), name, width)
         for name, width in (("drive_mean", drives), ("output_mean", sensors))
@@ -97,8 +105,28 @@ def _level(entry: dict[str, Any]) -> AxesLevel:
         angle_sd=_sized(_array(entry, "angle_sd_rad", 1), "angle_sd_rad", poles.size),
         misfit=_core.as_number("misfit", entry["misfit"]),
         expected=_core.as_number("expected_misfit", entry["expected_misfit"]),
+        distorted=_core.as_number("distorted", entry["distorted"]),
         **means,
     )
+
+
+def _regressors(entry: dict[str, Any], levels: tuple[AxesLevel, ...]) -> Regressors:
+    """Return the regressors that the forces of all levels belong to."""
+    numbers = {
+        name: tuple((_core.as_count(name, k), _core.as_number(name, size)) for k, size in rows)
+        for name, rows in (("stops", entry["stops"]), ("changes", entry["changes"]))
+    }
+    products = tuple(
+        tuple(_core.as_count("products", k) for k in variables) for variables in entry["products"]
+    )
+    found = Regressors(products, **numbers)
+    drives = levels[0].terms.direct.shape[1]
+    expected = drives + len(found) if found else 0
+    for one in levels:
+        if one.terms.forces.shape[1] != expected:
+            raise ShapeError("forces", f"{one.terms.forces.shape[1]} columns", f"{expected}")
+    found.core(levels[0].terms, levels[0].level)
+    return found
 
 
 def _complex(entry: dict[str, Any], name: str, dimensions: int) -> NDArray[np.complex128]:

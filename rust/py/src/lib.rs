@@ -34,5 +34,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     tune::register(module)?;
     stages::xy::register(module)?;
     stages::modal_system::register(module)?;
-    stages::modal_fit::register(module)
+    stages::modal_fit::register(module)?;
+    stages::distortion::register(module)?;
+    stages::regressors::register(module)
 }

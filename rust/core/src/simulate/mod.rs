@@ -9,6 +9,7 @@ mod apparatus;
 mod closed_loop;
 mod modal_system;
 mod open_loop;
+mod regressors;
 mod sensor;
 mod sensor_delay;
 mod timing;
@@ -24,6 +25,7 @@ pub use modal_system::{AxesLoop, AxesRun, ModalState, ModalSystem};
 
 pub(crate) use modal_system::check_modes;
 pub use open_loop::{OpenLoop, open_loop};
+pub use regressors::{Regressor, RegressorState, Regressors};
 pub use sensor::{Sensor, SensorState};
 pub use timing::{MissedTicks, Timing};
 pub use tracking::{DELAY_LINE, ReferenceSamples, TrackingRun, track};

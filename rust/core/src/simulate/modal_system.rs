@@ -1,9 +1,10 @@
 //! Modes in parallel with several drives and sensors, from sample to sample, alone or in a loop.
 
 use piezotrack_control::{Feedback, FeedbackSample};
+use pulp::{Simd, WithSimd};
 
 use crate::error::{Error, Result};
-use crate::math::{room, zeros};
+use crate::math::{dispatch_fused, room, zeros};
 
 /// A sampled system of n drives and m sensors whose modes stand in parallel.
 ///
@@ -72,7 +73,7 @@ pub struct AxesRun {
 }
 
 /// Refuses a list that has not as many entries as expected.
-fn sized(name: &str, found: usize, expected: usize) -> Result<()> {
+pub(super) fn sized(name: &str, found: usize, expected: usize) -> Result<()> {
     if found == expected {
         return Ok(());
     }
@@ -81,6 +82,16 @@ fn sized(name: &str, found: usize, expected: usize) -> Result<()> {
         found: format!("{found} entries"),
         expected: format!("{expected}"),
     })
+}
+
+/// The number of samples of so many channels, one or more.
+pub(super) fn whole_samples(name: &str, entries: usize, channels: usize) -> Result<usize> {
+    if channels == 0 || entries == 0 || !entries.is_multiple_of(channels) {
+        let found = format!("{entries} entries");
+        let expected = format!("whole samples of {channels} channels, one or more");
+        return Err(Error::Shape { name: name.into(), found, expected });
+    }
+    Ok(entries / channels)
 }
 
 /// Refuses modes whose lists do not fit each other, that are not stable or not finite.
@@ -162,6 +173,7 @@ impl ModalSystem {
     }
 
     /// Adds the output of a state under a drive to `output`, which has an entry for each sensor.
+    #[inline(always)]
     fn output(&self, state: &ModalState, drive: &[f64], output: &mut [f64]) {
         let count = self.modes();
         for (channel, slot) in output.iter_mut().enumerate() {
@@ -179,6 +191,7 @@ impl ModalSystem {
     }
 
     /// Advances a state by one sample under a drive, which has an entry for each channel.
+    #[inline(always)]
     fn advance(&self, state: &mut ModalState, drive: &[f64]) {
         let count = self.modes();
         let poles = self.poles[0].iter().zip(&self.poles[1]);
@@ -208,11 +221,7 @@ impl ModalSystem {
     pub fn simulate(&self, state: &mut ModalState, drive: &[f64]) -> Result<Vec<f64>> {
         let count = self.checked(state, "drive", drive.len(), self.drives)?;
         let mut outputs = zeros("the outputs", count * self.sensors)?;
-        let samples = drive.chunks_exact(self.drives);
-        for (slots, sample) in outputs.chunks_exact_mut(self.sensors).zip(samples) {
-            self.output(state, sample, slots);
-            self.advance(state, sample);
-        }
+        dispatch_fused(Motion { system: self, state, drive, outputs: &mut outputs });
         finite_outputs(outputs)
     }
 
@@ -287,12 +296,29 @@ impl ModalSystem {
     ) -> Result<usize> {
         sized("state", state.real.len(), self.modes())?;
         sized("state", state.imaginary.len(), self.modes())?;
-        if channels == 0 || entries == 0 || !entries.is_multiple_of(channels) {
-            let found = format!("{entries} entries");
-            let expected = format!("whole samples of {channels} channels, one or more");
-            return Err(Error::Shape { name: name.into(), found, expected });
+        whole_samples(name, entries, channels)
+    }
+}
+
+/// Modes that a drive moves; wider vectors change no bits, as every mode is by itself.
+struct Motion<'a> {
+    system: &'a ModalSystem,
+    state: &'a mut ModalState,
+    drive: &'a [f64],
+    outputs: &'a mut [f64],
+}
+
+impl WithSimd for Motion<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        let Self { system, state, drive, outputs } = self;
+        let samples = drive.chunks_exact(system.drives);
+        for (slots, sample) in outputs.chunks_exact_mut(system.sensors).zip(samples) {
+            system.output(state, sample, slots);
+            system.advance(state, sample);
         }
-        Ok(entries / channels)
     }
 }
 

@@ -18,13 +18,13 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 type Array<'py> = Bound<'py, PyArray1<f64>>;
 
 /// Numbers of drives and sensors, poles, b, c and D.
-type Given<'py> = (usize, usize, Parts<'py>, Parts<'py>, Parts<'py>, Bound<'py, PyAny>);
+pub(super) type Given<'py> = (usize, usize, Parts<'py>, Parts<'py>, Parts<'py>, Bound<'py, PyAny>);
 
 /// Poles, b and c as real and imaginary parts, and D.
 type Found<'py> =
     ((Array<'py>, Array<'py>), (Array<'py>, Array<'py>), (Array<'py>, Array<'py>), Array<'py>);
 
-fn terms(given: &Given<'_>) -> PyResult<ModalTerms> {
+pub(super) fn terms(given: &Given<'_>) -> PyResult<ModalTerms> {
     let (drives, sensors, poles, inputs, outputs, direct) = given;
     let poles = complex("poles", poles)?;
     let (inputs, outputs) = (complex("inputs", inputs)?, complex("outputs", outputs)?);

@@ -7,6 +7,7 @@
 
 mod derivatives;
 mod deviations;
+mod distortion;
 mod factors;
 mod products;
 mod pursuit;
@@ -14,6 +15,7 @@ mod refine;
 mod responses;
 mod terms;
 
+pub use distortion::{Distortion, DistortionRecord, choose_distortion};
 pub use refine::Descent;
 pub use responses::ModalFit;
 pub use terms::ModalTerms;
