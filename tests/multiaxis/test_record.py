@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.multiaxis import MultiAxisRecord
+from piezotrack.multiaxis import MultiAxisRecord, VirtualAxes, read_axes
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 NOISE = np.random.default_rng(3).normal(size=(64, 3, 4, 2))
 
@@ -98,3 +101,25 @@ def test_a_file_of_arrays_is_read_in_um(tmp_path: Any) -> None:
         MultiAxisRecord.from_npz(path, drive="u_1", output="y_2", dt=1e-3)
     with pytest.raises(pt.DataError, match="cannot be read"):
         MultiAxisRecord.from_npz(tmp_path / "none.npz", drive="u", output="y", dt=1e-3)
+
+
+def test_records_in_files_of_numpy_are_read_as_logs_are(tmp_path: Path) -> None:
+    made = VirtualAxes.three(noise=1e-9, seed=1).record(samples=64, realisations=3)
+    flat = [np.concatenate([one[..., 0], one[..., 1]]) for one in (made.u, made.y)]
+    np.savez(tmp_path / "own.npz", u=made.u, y=1e6 * made.y, dt=made.dt)
+    np.savez(tmp_path / "flat.npz", v=flat[0], z=1e9 * flat[1])
+    (own,) = read_axes(tmp_path / "own.npz", drives=["u"], displacements=["y"])
+    (other,) = read_axes(
+        tmp_path / "flat.npz",
+        drives=["v"],
+        displacements=["z"],
+        dt=made.dt,
+        units={"displacement": "nm"},
+        period=64 * made.dt,
+    )
+    for record in (own, other):
+        assert record.dt == made.dt
+        assert (record.u == made.u).all()
+        np.testing.assert_allclose(record.y, made.y, rtol=1e-14)
+    with pytest.raises(pt.ParameterError, match="are a multiple"):
+        read_axes(tmp_path / "flat.npz", drives=["v"], displacements=["z"], dt=made.dt, period=0.03)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -17,10 +18,10 @@ from ..control.laws.pid import Pid
 from ..errors import ParameterError, ShapeError
 from .decoupling import decoupling_matrix, reference_of, terms_of
 from .modal_model import MultiAxisModel
+from .references import sampled_references
 from .virtual import VirtualAxes
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
@@ -187,13 +188,17 @@ class MultiAxisTracking(Result):
             "provenance": {"package": "piezotrack", "version": _core.__version__},
         }
 
-    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
+    def save(
+        self, folder: str | os.PathLike[str], *, entries: Mapping[str, Any] | None = None
+    ) -> list[Path]:
         """Write the motion to a folder, in one go.
 
         Parameters
         ----------
         folder : path-like
             It is made where it does not exist.
+        entries : mapping, optional
+            Further entries of the JSON file.
 
         Returns
         -------
@@ -205,7 +210,8 @@ class MultiAxisTracking(Result):
         DataError
             The folder cannot be made or written to.
         """
-        return write_result(folder, "axes_run", self.document(), self.plot(), self.table)
+        document = self.document() | dict(entries or {})
+        return write_result(folder, "axes_run", document, self.plot(), self.table)
 
 
 def check_axes(
@@ -275,7 +281,7 @@ def check_axes(
 
 def track_axes(
     stage: MultiAxisModel | VirtualAxes,
-    reference: ArrayLike,
+    reference: ArrayLike | str | os.PathLike[str],
     feedback: Pid | Sequence[Pid],
     *,
     decoupling: str = "static",
@@ -295,8 +301,10 @@ def track_axes(
     ----------
     stage : MultiAxisModel or VirtualAxes
         The axes; the drives are about the operating point.
-    reference : array_like, shape (samples, sensors)
-        Desired displacements [m], from rest at 0.
+    reference : array_like of shape (samples, sensors), str or path-like
+        Desired displacements [m], from rest at 0; or as the command line takes them: a file with a
+        displacement column of each axis, a path of two axes, as ``"circle:2Hz,10um"``, or a motion
+        of each divided by semicolons, as ``"sine:5Hz,0..2um;;"``, where an axis without one stays.
     feedback : Pid or sequence of Pid
         A law for each axis, or one for all; `kp` is a ratio [m/m].
     decoupling : {"static", "diagonal"}, optional
@@ -323,9 +331,11 @@ def track_axes(
     Raises
     ------
     ParameterError
-        An argument is of another kind, or the limits are no range.
+        An argument is of another kind, a text cannot be parsed, or the limits are no range.
     ShapeError
-        Sizes do not fit each other.
+        Sizes do not fit each other, or references of axes have unequal lengths.
+    DataError
+        A file cannot be read or used.
     NumericalError
         The motion leaves the range of numbers, as the loop is unstable.
 
@@ -342,6 +352,8 @@ def track_axes(
     """
     terms, laws, matrix = _parts(stage, feedback, decoupling, level, model)
     sensors, drives = terms.direct.shape
+    if isinstance(reference, str | os.PathLike):
+        reference = sampled_references(reference, sensors, stage.dt)
     wanted = reference_of(reference, sensors)
     low, high = (-np.inf, np.inf) if limits is None else number_pair("limits", limits, "V")
     if isinstance(feedforward, str):

@@ -11,7 +11,7 @@ import numpy as np
 from .._support.arguments import has_entries, positive
 from .._support.messages import quoted
 from ..data.reader import read
-from ..errors import DataError, ParameterError, PiezotrackError
+from ..errors import DataError, ParameterError, PiezotrackError, ShapeError
 from ..response.periods import period_of
 from .identify import DISTINCT
 from .record import MultiAxisRecord
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from ..data.dataset import Dataset
 
-__all__ = ["read_axes"]
+__all__ = ["are_axes", "read_axes"]
 
 
 def read_axes(
@@ -37,13 +37,15 @@ def read_axes(
     Parameters
     ----------
     paths : path-like or sequence of path-like
-        Logs of any format that `pt.read` takes, each with columns of all drives and displacements.
+        Logs of any format that `pt.read` takes, each with columns of all drives and displacements;
+        or ``.npz`` files of records, as of `MultiAxisRecord.from_npz`.
     drives, displacements : sequence of str or int
-        The columns.
+        The columns; of a record, one array each.
     period : float, optional
         Period of the drives [s]; found by default. The last whole periods of a log are taken.
     **reading : object
-        Other arguments of `pt.read`, as ``dt`` and ``units``.
+        Other arguments of `pt.read`, as ``dt`` and ``units``; of a record these two alone, with
+        the unit of the role ``displacement``, um by default.
 
     Returns
     -------
@@ -81,8 +83,14 @@ def read_axes(
     if not files:
         raise ParameterError("paths", "an empty list", "a log or more")
     given = None if period is None else positive("period", period, "s")
+    single = len(drives) == len(displacements) == 1
     records = sorted(
-        (_realisation(file, drives, displacements, given, reading) for file in files),
+        (
+            _record(file, str(drives[0]), str(displacements[0]), given, reading)
+            if single and are_axes(file, str(drives[0]), str(displacements[0]))
+            else _realisation(file, drives, displacements, given, reading)
+            for file in files
+        ),
         key=lambda one: one.level,
     )
     levels: list[list[MultiAxisRecord]] = [[records[0]]]
@@ -94,6 +102,65 @@ def read_axes(
     return [MultiAxisRecord.joined(_alike(one)) for one in levels]
 
 
+def are_axes(file: str | os.PathLike[str], drive: str, displacement: str) -> bool:
+    """Whether a file of NumPy has arrays of several axes, or of several realisations, so called."""
+    if not str(file).lower().endswith(".npz"):
+        return False
+    try:
+        with np.load(file, allow_pickle=False) as arrays:
+            shapes = [arrays[name].shape for name in (drive, displacement) if name in arrays.files]
+    except (OSError, ValueError):
+        # What is wrong with it is said where it is read.
+        return False
+    return any(len(shape) > 2 or (len(shape) == 2 and shape[1] > 1) for shape in shapes)
+
+
+def _record(
+    file: str | os.PathLike[str],
+    drive: str,
+    displacement: str,
+    period: float | None,
+    reading: dict[str, Any],
+) -> MultiAxisRecord:
+    """Read a record from a file of NumPy, and divide it by its period."""
+    units = reading.get("units", {})
+    unknown = [name for name in reading if name not in ("dt", "units")]
+    unknown += [name for name in units if name not in ("displacement", displacement)]
+    if unknown:
+        raise ParameterError(
+            unknown[0], f"given for {Path(file).name}", "dt and the unit of the displacement alone"
+        )
+    unit = units.get("displacement", units.get(displacement, "um"))
+    name = Path(file).name
+    try:
+        record = MultiAxisRecord.from_npz(
+            file,
+            drive=drive,
+            output=displacement,
+            dt=reading.get("dt"),
+            output_unit=unit,
+            source=name,
+        )
+    except ShapeError as error:
+        raise error.of(name) from None
+    if period is None:
+        return record
+    if record.u.shape[3] > 1:
+        raise ParameterError("period", f"given for {name}", "none, as its arrays have periods")
+    count = round(record.samples * record.dt / period)
+    if count < 1 or count * round(period / record.dt) != record.samples:
+        raise ParameterError(
+            "period",
+            f"{period:g} s",
+            f"a time of which the {record.samples * record.dt:g} s of {name} are a multiple",
+        )
+    u, y = (np.moveaxis(one[..., 0], 0, -1) for one in (record.u, record.y))
+    u, y = (np.moveaxis(one.reshape(*one.shape[:2], count, -1), -1, 0) for one in (u, y))
+    return MultiAxisRecord(
+        u=u, y=y, dt=record.dt, output_unit=record.output_unit, source=record.source
+    )
+
+
 def _alike(level: list[MultiAxisRecord]) -> list[MultiAxisRecord]:
     """Return the records of a level, each with as many periods as the shortest."""
     fewest = min(one.u.shape[3] for one in level)
@@ -103,6 +170,7 @@ def _alike(level: list[MultiAxisRecord]) -> list[MultiAxisRecord]:
             y=one.y[..., -fewest:],
             dt=one.dt,
             drive_unit=one.drive_unit,
+            output_unit=one.output_unit,
             source=one.source,
         )
         for one in level

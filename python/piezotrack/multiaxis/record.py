@@ -12,7 +12,7 @@ from .. import _core
 from .._support.arguments import expect, has_entries
 from .._support.arrays import MOST_SAMPLES, check_dt, unmasked
 from .._support.messages import quoted
-from .._support.units import drive_text
+from .._support.units import drive_text, lookup
 from ..errors import DataError, ParameterError, ShapeError
 
 if TYPE_CHECKING:
@@ -179,7 +179,13 @@ class MultiAxisRecord:
 
     @classmethod
     def from_npz(
-        cls, path: str | os.PathLike[str], *, drive: str, output: str, dt: float, **settings: Any
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        drive: str = "u",
+        output: str = "y",
+        dt: float | None = None,
+        **settings: Any,
     ) -> MultiAxisRecord:
         """Read a record from arrays of an ``.npz`` file of NumPy.
 
@@ -187,13 +193,13 @@ class MultiAxisRecord:
         ----------
         path : path-like
             The file.
-        drive, output : str
+        drive, output : str, optional
             Names of its arrays: drives [V] and displacements in `output_unit`, by default [um].
-        dt : float
-            Sampling interval [s].
+        dt : float, optional
+            Sampling interval [s]; by default the number ``dt`` of the file.
         **settings : object
-            Other arguments of the class; ``output_unit`` "um", the default here, or a unit in
-            which they are kept.
+            Other arguments of the class; ``output_unit`` "um", the default here, another unit of
+            length, or a unit in which they are kept.
 
         Returns
         -------
@@ -204,6 +210,18 @@ class MultiAxisRecord:
         ------
         DataError
             The file is missing, or is none of NumPy, or has no such array.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import numpy as np
+        >>> import piezotrack as pt
+        >>> made = pt.multiaxis.VirtualAxes.three(noise=1e-9, seed=1).record(samples=64)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     path = pathlib.Path(folder, "axes.npz")
+        ...     np.savez(path, u=made.u, y=1e6 * made.y, dt=made.dt)
+        ...     pt.multiaxis.MultiAxisRecord.from_npz(path)
+        <MultiAxisRecord: 3 drives, 3 sensors, 6 realisations of 2 x 64 samples, 1 V rms>
         """
         expect("path", path, (str, os.PathLike), "the name of a file")
         try:
@@ -215,14 +233,23 @@ class MultiAxisRecord:
                         f"{', '.join(arrays.files)}"
                     )
                 u, y = arrays[drive], arrays[output]
+                own = arrays["dt"] if "dt" in arrays.files else None
         except (OSError, ValueError, AttributeError) as error:
             if isinstance(error, DataError):
                 raise
             raise DataError(f"{path} cannot be read: expected an .npz file of NumPy") from None
         settings.setdefault("source", f"{path}")
-        if settings.get("output_unit", "um") == "um":
-            settings.pop("output_unit", None)
-            return cls.from_um(u=u, y=y, dt=dt, **settings)
+        if dt is None:
+            if own is None or own.shape != () or own.dtype.kind not in "uif":
+                raise DataError(
+                    f"{path} has no number 'dt', the sampling interval in s: expected it there, or "
+                    "dt="
+                )
+            dt = float(own)
+        unit = lookup(settings.get("output_unit", "um"))
+        if unit is not None and unit.quantity == "displacement":
+            settings["output_unit"] = "m"
+            y = unit.factor / unit.divisor * _numbers("y", y)
         return cls(u=u, y=y, dt=dt, **settings)
 
     @property

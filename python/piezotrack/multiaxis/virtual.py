@@ -154,6 +154,44 @@ class VirtualAxes:
             seed=seed,
         )
 
+    @classmethod
+    def xu_li_2010(cls, *, cubic: float = 0.0, noise: float = 97e-9, seed: int = 0) -> VirtualAxes:
+        """Make an XY stage like that of Xu and Li 2010, doi 10.1115/1.4001712, without hysteresis.
+
+        A mode of 160 Hz with a damping ratio of 0.065 along each axis, 117.8 and 115 um under
+        75 V, and the cross-talk of `XYStage.xu_li_2010`, at 1 kHz.
+
+        Parameters
+        ----------
+        cubic, noise, seed
+            As of the class; by default the noise of the paper's sensor.
+
+        Returns
+        -------
+        VirtualAxes
+            Two drives, two sensors, two modes.
+
+        Examples
+        --------
+        >>> import piezotrack as pt
+        >>> stage = pt.multiaxis.VirtualAxes.xu_li_2010()
+        >>> (1e6 * stage.static_gain).round(3).tolist()
+        [[1.571, 0.023], [0.016, 1.533]]
+        """
+        gains = np.array([117.8e-6, 115e-6]) / 75.0
+        # Of each axis in the sensors of x and y.
+        shares = np.array([[1.0, 0.010], [0.015, 1.0]])
+        return cls(
+            frequencies=[160.0, 160.0],
+            damping_ratios=[0.065, 0.065],
+            drive_shapes=np.eye(2),
+            sensor_shapes=gains[:, np.newaxis] * shares,
+            dt=1e-3,
+            cubic=cubic,
+            noise=noise,
+            seed=seed,
+        )
+
     @cached_property
     def terms(self) -> ModalTerms:
         """The sampled modes."""

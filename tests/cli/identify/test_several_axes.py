@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,3 +65,53 @@ def test_what_does_not_fit_is_refused_in_one_sentence(arguments: list[str], word
 def test_a_wrong_period_is_refused() -> None:
     words = refusal("identify", *written(1.0), *COLUMNS, "--period", "90ms")
     assert "the periods of the drives differ" in words
+
+
+def saved(name: str, *, level: float = 1.0, **changes: Any) -> str:
+    """Write a record of two axes as arrays of a file of NumPy."""
+    record = pt.multiaxis.VirtualAxes.xu_li_2010(noise=1e-9, seed=1).record(
+        realisations=4, samples=256, level=level
+    )
+    arrays = {"u": record.u, "y": 1e6 * record.y, "dt": record.dt}
+    np.savez(name, **{k: v for k, v in (arrays | changes).items() if v is not None})
+    return name
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_records_are_read_from_arrays() -> None:
+    ran("identify", saved("one.npz"), saved("half.npz", level=0.5), "-o", "found")
+    model = pt.multiaxis.load_axes(Path("found", "axes.json"))
+    assert [one.level for one in model.levels] == pytest.approx([0.5, 1.0], rel=1e-6)
+    assert model.frequencies() == pytest.approx([160.0, 160.0], rel=1e-4)
+    gains = pt.multiaxis.VirtualAxes.xu_li_2010().static_gain
+    np.testing.assert_allclose(model.static_gain(), gains, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "arguments", "words"),
+    [
+        (
+            {"dt": None},
+            [],
+            "no number 'dt', the sampling interval in s: expected it there",
+        ),
+        ({"dt": np.ones(2)}, [], "no number 'dt'"),
+        ({"y": np.ones((255, 2, 4, 2))}, [], "r.npz: y has 255 samples: expected 256"),
+        ({"y": np.ones((256, 2, 3, 2))}, [], "r.npz: y has 3 realisations: expected 4"),
+        ({"y": None}, [], "has no array 'y': expected one of u, dt"),
+        ({}, ["--displacement", "x"], "has no array 'x'"),
+        ({}, ["--skip", "2"], "--skip is given for r.npz: expected dt and the unit"),
+        ({}, ["--period", "256ms"], "--period is given for r.npz: expected none"),
+        ({}, ["--model", "dahl"], "--model has no effect with several axes"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(
+    changes: dict[str, Any], arguments: list[str], words: str
+) -> None:
+    assert words in refusal("identify", saved("r.npz", **changes), *arguments)
+
+
+def test_one_realisation_is_too_few() -> None:
+    with np.load(saved("r.npz")) as arrays:
+        saved("one.npz", **{k: arrays[k][:, :, :1] for k in ("u", "y")})
+    assert "1 realisation for 2 drives" in refusal("identify", "one.npz")

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ...stages.virtual import VirtualStage
 
 __all__ = [
+    "MOST_SENSITIVITY",
     "NO_FEEDBACK",
     "PAPER",
     "BeyondReach",

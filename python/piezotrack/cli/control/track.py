@@ -30,6 +30,7 @@ from .loop_options import (
     unit_of,
     zero_words,
 )
+from .several_axes import axes_in, refuse_several_references, track_several
 
 if TYPE_CHECKING:
     from ...control.controller.controller import Controller
@@ -72,10 +73,18 @@ def track_command(
     """Track a reference in closed loop.
 
     On a simulated stage; with --device this computer closes the loop of a CONTROLLER on a device.
+    A model of several axes takes --kp and --ti of each decoupled axis, and as REFERENCE a file with
+    a column of each, a path, or a motion of each, divided by semicolons.
     """
     from ...control.controller.controller import Controller
     from ...control.running.zero import zero as read_zero
 
+    if (axes := axes_in(model)) is not None:
+        track_several(
+            axes, model, reference, stage, motion, loop, simulation, output, unstable=unstable
+        )
+        return
+    refuse_several_references(reference)
     free = {"beyond_reach": beyond_reach, "unstable": unstable}
     desired = motion.of(reference)
     if device is not None:

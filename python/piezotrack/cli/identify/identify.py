@@ -71,8 +71,8 @@ def identify_command(
     ] = None,
     output: Output,
 ) -> None:
-    """Identify models of a stage, or of axes (--drive a,b), from logs."""
-    if is_several(reading):
+    """Identify models of a stage, or of axes (--drive a,b or .npz), from logs."""
+    if is_several(files, reading):
         identify_several(files, reading, period, output)
         return
     refuse_without_effect(["period"], "with one axis")

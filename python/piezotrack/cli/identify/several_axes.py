@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 __all__ = ["identify_several", "is_several"]
 
+# Arrays of a record in a file of NumPy, where no others are named.
+ARRAYS = {"drive": "u", "displacement": "y"}
 # Options that act on several axes.
 ACTING = {
     *("files", "drive", "displacement", "period", "time", "unit", "dt", "rate", "skip"),
@@ -25,15 +27,20 @@ ACTING = {
 }
 
 
-def is_several(reading: LogOptions) -> bool:
-    """Whether the columns are those of several axes."""
-    return any("," in (one or "") for one in (reading.drive, reading.displacement))
+def is_several(files: list[Path], reading: LogOptions) -> bool:
+    """Whether the columns, or the arrays of a file of NumPy, are those of several axes."""
+    from ...multiaxis.reading import are_axes
+
+    if any("," in (one or "") for one in (reading.drive, reading.displacement)):
+        return True
+    drive, displacement = reading.drive or ARRAYS["drive"], reading.displacement
+    return all(are_axes(file, drive, displacement or ARRAYS["displacement"]) for file in files)
 
 
 def identify_several(
     files: list[Path], reading: LogOptions, period: float | None, output: Output
 ) -> None:
-    """Identify the modes of several axes from logs, each a realisation."""
+    """Identify the modes of several axes from logs, each a realisation, or from records."""
     from ..._support.files.writing import picture_files
     from ...multiaxis.identify import identify_axes
     from ...multiaxis.reading import read_axes
@@ -41,8 +48,9 @@ def identify_several(
     others = [one.name for one in click.get_current_context().command.params if one.name]
     refuse_without_effect([name for name in others if name not in ACTING], "with several axes")
     names = {}
-    for name in ("drive", "displacement"):
-        if (text := getattr(reading, name)) is None:
+    arrays = all(file.suffix.lower() == ".npz" for file in files)
+    for name, default in ARRAYS.items():
+        if (text := getattr(reading, name) or (default if arrays else None)) is None:
             raise ParameterError(f"--{name}", "missing", "columns of all axes, divided by commas")
         names[name] = [column(one.strip()) or one for one in text.split(",")]
     output.will_write(["axes.csv", "axes.json", *picture_files("axes")])

@@ -60,6 +60,8 @@ OWN = {
 }
 # Most samples to which one is interpolated.
 MOST_FINER = 100
+# Format of models of several axes.
+SEVERAL_AXES = "piezotrack-axes"
 # Entries of a parameter that are not details of the fit.
 FACTS = ("value", "unit", "symbol")
 
@@ -237,6 +239,11 @@ def checked_content(
     """
     name, document = read_content(path)
     if not isinstance(document, dict) or document.get("format") != form:
+        if isinstance(document, dict) and document.get("format") == SEVERAL_AXES:
+            raise DataError(
+                f"{name} is a model of several axes, which only `track` takes: expected a {kind} "
+                "of one axis"
+            )
         raise DataError(f"{name} is not a piezotrack {kind}: its 'format' is not '{form}'")
     found = document.get("schema_version")
     known = range(latest if first is None else first, latest + 1)
