@@ -46,13 +46,21 @@ def main(path: str) -> None:
     for level, record in records.items():
         own: list[float] = []
         modes: list[float] = []
+        distorted: list[float] = []
         for left in range(record.realisations):
             kept = record.only([k for k in range(record.realisations) if k != left])
             test = record.only([left])
             own.append(float(approximate_axes(kept).score(test)[0]))
-            modes.append(float(identify_axes(kept).score(test)[0]))
-            print(f"{level} mV, {left} left out: response {own[-1]:.4f}, modes {modes[-1]:.4f}")
-        print(f"{level} mV: response {spread(own)} %, modes {spread(modes)} %")
+            modes.append(float(identify_axes(kept, distortion=False).score(test)[0]))
+            distorted.append(float(identify_axes(kept).score(test)[0]))
+            print(
+                f"{level} mV, {left} left out: response {own[-1]:.4f}, modes {modes[-1]:.4f}, "
+                f"with distortion {distorted[-1]:.4f}"
+            )
+        print(
+            f"{level} mV: response {spread(own)} %, modes {spread(modes)} %, "
+            f"with distortion {spread(distorted)} %"
+        )
     for level in LEVELS:
         others = identify_axes([one for other, one in records.items() if other != level])
         print(f"{level} mV from the others: modes {spread(list(others.score(records[level])))} %")
