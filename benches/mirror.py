@@ -43,6 +43,7 @@ def main(path: str) -> None:
         model.simulate(drive)
         times.append(time.perf_counter() - begun)
     print(f"simulated {drive.shape[0]} samples in {1e3 * np.median(times):.1f} ms")
+    medians: dict[str, list[str]] = {"response": [], "modes": []}
     for level, record in records.items():
         own: list[float] = []
         modes: list[float] = []
@@ -53,6 +54,10 @@ def main(path: str) -> None:
             modes.append(float(identify_axes(kept).score(test)[0]))
             print(f"{level} mV, {left} left out: response {own[-1]:.4f}, modes {modes[-1]:.4f}")
         print(f"{level} mV: response {spread(own)} %, modes {spread(modes)} %")
+        medians["response"].append(f"{100.0 * np.median(own):.2f}")
+        medians["modes"].append(f"{100.0 * np.median(modes):.2f}")
+    cells = " | ".join(f"{' / '.join(values)} %" for values in medians.values())
+    print(f"| mirror, {' / '.join(map(str, LEVELS))} mV rms | {cells} |")
     for level in LEVELS:
         others = identify_axes([one for other, one in records.items() if other != level])
         print(f"{level} mV from the others: modes {spread(list(others.score(records[level])))} %")
