@@ -43,6 +43,7 @@ def main(path: str) -> None:
         model.simulate(drive)
         times.append(time.perf_counter() - begun)
     print(f"simulated {drive.shape[0]} samples in {1e3 * np.median(times):.1f} ms")
+    medians: dict[str, list[str]] = {"response": [], "modes": [], "with distortion": []}
     for level, record in records.items():
         own: list[float] = []
         modes: list[float] = []
@@ -57,10 +58,11 @@ def main(path: str) -> None:
                 f"{level} mV, {left} left out: response {own[-1]:.4f}, modes {modes[-1]:.4f}, "
                 f"with distortion {distorted[-1]:.4f}"
             )
-        print(
-            f"{level} mV: response {spread(own)} %, modes {spread(modes)} %, "
-            f"with distortion {spread(distorted)} %"
-        )
+        for name, errors in zip(medians, (own, modes, distorted), strict=True):
+            print(f"{level} mV, {name}: {spread(errors)} %")
+            medians[name].append(f"{100.0 * np.median(errors):.2f}")
+    cells = " | ".join(f"{' / '.join(values)} %" for values in medians.values())
+    print(f"| mirror, {' / '.join(map(str, LEVELS))} mV rms | {cells} |")
     for level in LEVELS:
         others = identify_axes([one for other, one in records.items() if other != level])
         print(f"{level} mV from the others: modes {spread(list(others.score(records[level])))} %")

@@ -81,6 +81,8 @@ def identify_axes(
         Records have different numbers of drives or sensors.
     DataError
         A record has fewer realisations than drives, or fewer lines than unknowns.
+    NumericalError
+        The responses do not change with the frequency.
 
     Examples
     --------

@@ -53,14 +53,14 @@ class ModalTerms:
     forces: Complex = field(default_factory=lambda: np.zeros((0, 0), dtype=np.complex128))
 
     @classmethod
-    def _of(cls, found: Found) -> ModalTerms:
+    def _of(cls, found: Found, sensors: int, drives: int) -> ModalTerms:
         """Return the terms that the compiled core gives."""
         poles, inputs, outputs = (real + 1j * imaginary for real, imaginary in found[:3])
         return cls(
             poles,
-            inputs.reshape(poles.size, -1),
-            outputs.reshape(poles.size, -1),
-            found[3].reshape(outputs.size // poles.size, -1),
+            inputs.reshape(-1, drives),
+            outputs.reshape(-1, sensors),
+            found[3].reshape(sensors, drives),
         )
 
     def _parts(self) -> Parts:
@@ -88,7 +88,7 @@ class ModalTerms:
 
     def balanced(self) -> ModalTerms:
         """Return the same with b and c of equal size, the largest b real, and poles above."""
-        return ModalTerms._of(_core.balanced_terms(self._parts()))
+        return ModalTerms._of(_core.balanced_terms(self._parts()), *self.direct.shape)
 
     def scaled(self, factor: float) -> ModalTerms:
         """Return the terms of a response that is larger by a factor."""
@@ -96,7 +96,9 @@ class ModalTerms:
 
     def aligned(self, other: ModalTerms) -> tuple[Complex, Complex]:
         """Return b and c, turned and sized so that b is as near to that of others as it can."""
-        turned = ModalTerms._of(_core.aligned_terms(self._parts(), other._parts()))
+        turned = ModalTerms._of(
+            _core.aligned_terms(self._parts(), other._parts()), *self.direct.shape
+        )
         return turned.inputs, turned.outputs
 
     def between(self, other: ModalTerms, share: float) -> ModalTerms:

@@ -41,6 +41,7 @@ class Target:
         self._fit = _core.ModalFit(
             drives, sensors, angles, (value.real.ravel(), value.imag.ravel()), weight
         )
+        self._shape = (sensors, drives)
         self._variance = response.variance / scale**2
         self.numbers = 2 * lines * sensors * drives
         # Weighted sums of squares: errors that noise and distortion make expected, and the value.
@@ -67,7 +68,7 @@ class Target:
         ModalTerms
             The modes, refined.
         """
-        return ModalTerms._of(self._fit.pursue(self.expected, most, fixed))
+        return ModalTerms._of(self._fit.pursue(self.expected, most, fixed), *self._shape)
 
     def refine(self, start: ModalTerms, *, held: float = 0.0) -> ModalTerms:
         """Return the terms of the least misfit near some.
@@ -85,7 +86,7 @@ class Target:
             Where the descent ended.
         """
         price = held * self.expected / self.numbers
-        return ModalTerms._of(self._fit.refine(start._parts(), price))
+        return ModalTerms._of(self._fit.refine(start._parts(), price), *self._shape)
 
     def pole_deviations(self, terms: ModalTerms) -> tuple[Array, Array]:
         """Return standard deviations of logarithms of decays, and of angles, of the poles."""

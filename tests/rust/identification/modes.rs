@@ -147,6 +147,9 @@ fn what_does_not_fit_is_refused_by_name() {
     assert!(fit.pursue(1.0, 0, true, NEVER).is_err());
     assert!(fit.pole_deviations(&truth(), &[1.0]).is_err());
     assert!(Descent::last(-1.0).is_err());
+    let constant = vec![[1.0, 0.0]; value.len()];
+    let fit = ModalFit::new(SIZES, &angles, &constant, &weights()).unwrap();
+    assert!(fit.pursue(1.0, 3, true, NEVER).unwrap_err().to_string().contains("show no mode"));
     let other = ModalTerms::new([1, 1], &[[0.5, 0.0]], &[[1.0, 0.0]], &[[1.0, 0.0]], &[0.0]);
     assert!(fit.misfit(&other.unwrap()).is_err());
 }

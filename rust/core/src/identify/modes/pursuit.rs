@@ -54,7 +54,8 @@ impl ModalFit {
     /// twice its penalty. Where `stop` says so, it ends early.
     ///
     /// # Errors
-    /// [`Error::Parameter`] where `expected` or `most` is not above 0; [`Error::Memory`].
+    /// [`Error::Parameter`] where `expected` or `most` is not above 0; [`Error::Numerical`] where
+    /// the responses are constant; [`Error::Memory`].
     pub fn pursue(
         &self,
         expected: f64,
@@ -97,6 +98,11 @@ impl ModalFit {
             } else if number - place >= PATIENCE {
                 break;
             }
+        }
+        if best.poles.is_empty() && !stop() {
+            return Err(Error::Numerical(
+                "the responses show no mode: expected some that change with the frequency".into(),
+            ));
         }
         let found = self.refined(&best, Descent::last(0.0)?, stop)?.terms;
         let far: Vec<f64> = (found.poles.iter())
