@@ -42,6 +42,7 @@
 struct Readme;
 
 mod back_calculation;
+pub mod cast;
 pub mod controller;
 pub mod creep;
 pub mod cubic_motion;
@@ -70,6 +71,7 @@ pub mod snapshot;
 pub mod state_space;
 pub mod unfused;
 
+pub use cast::Cast;
 pub use controller::{Command, Controller, ControllerState};
 pub use creep::{Creep, CreepState};
 pub use damping::damped::{Damped, DampedState};
@@ -96,9 +98,10 @@ pub use iterative_learning::IterativeLearning;
 pub use lead_lag::LeadLag;
 pub use limits::Limits;
 pub use measurement::{Refused, Span};
-pub use number::Number;
+pub use number::{Number, Real};
 pub use online_feedforward::{OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
 pub use pid::{Pid, PidState, SampledPid};
+
 pub use repetitive::{
     Outcome, Recursion, Repetitive, RepetitiveState, SampledRepetitive, Smoothing,
 };

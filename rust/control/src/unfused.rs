@@ -2,7 +2,8 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::Number;
+use crate::number::Number;
+use crate::snapshot::Snapshot;
 
 /// A number whose `mul_add` is a multiplication and an addition, each rounded. On a target
 /// without a fused instruction `f64::mul_add` is a call of a slow library function, and those of
@@ -94,5 +95,15 @@ impl Number for Unfused {
     #[inline(always)]
     fn smaller(self, other: Self) -> Self {
         Self(self.0.smaller(other.0))
+    }
+}
+
+impl Snapshot for Unfused {
+    fn save(&self, write: &mut dyn FnMut(f64)) {
+        write(self.0);
+    }
+
+    fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
+        self.0.load(read)
     }
 }

@@ -12,5 +12,6 @@ mod metrics;
 mod online_feedforward;
 mod repetitive;
 mod scheduled_pid;
+mod single_precision;
 mod tune;
 mod two_axes;

@@ -32,7 +32,7 @@ pub const FRICTION_ELEMENTS: usize = 3;
 /// ```
 /// use piezotrack_control::hysteresis::{Operator, ParallelDahl};
 ///
-/// let friction = ParallelDahl::geometric([2.0, 1.0, 0.5], 2.0, 4.0);
+/// let friction = ParallelDahl::geometric([2.0_f64, 1.0, 0.5], 2.0, 4.0);
 /// assert_eq!(friction.coulomb_forces, [4.0, 8.0, 16.0]);
 /// let up = friction.branch(&friction.rest(), 1.0);
 /// let (force, slope) = friction.output(&friction.along(&up, 1000.0));
