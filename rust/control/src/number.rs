@@ -18,9 +18,16 @@ pub trait Number:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// `value` in every lane.
+    /// The real type of a lane.
+    type Lane: Real;
+
+    /// A constant in every lane.
     #[must_use]
     fn like(self, value: f64) -> Self;
+
+    /// `value` in every lane.
+    #[must_use]
+    fn each(self, value: Self::Lane) -> Self;
 
     /// `self * factor + term`, rounded once.
     #[must_use]
@@ -32,7 +39,10 @@ pub trait Number:
 
     /// Calls a scalar function for every lane, for functions other than those above.
     #[must_use]
-    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self;
+    fn lanewise<const A: usize>(
+        arguments: [Self; A],
+        function: impl Fn([Self::Lane; A]) -> Self::Lane,
+    ) -> Self;
 
     /// `yes` in the lanes where `self < 0`, `no` in the others (and where `self` is NaN).
     #[must_use]
@@ -53,11 +63,17 @@ pub trait Number:
 /// A real number in floating point: `f64` or `f32`.
 ///
 /// Functions other than the operations of [`Number`] are those of libm for that type.
-pub trait Real: Number + PartialOrd + Default + Debug + Into<f64> + Snapshot {
+pub trait Real: Number<Lane = Self> + PartialOrd + Default + Debug + Into<f64> + Snapshot {
     /// Zero.
     const ZERO: Self;
     /// Infinity.
     const INFINITY: Self;
+    /// Not a number.
+    const NAN: Self;
+    /// Distance from 1 to the next larger number.
+    const EPSILON: Self;
+    /// The smallest number above 0 with all its digits.
+    const MIN_POSITIVE: Self;
     /// Numbers this far from 0 soon overflow, and enter no state.
     const HUGE: Self;
 
@@ -77,6 +93,30 @@ pub trait Real: Number + PartialOrd + Default + Debug + Into<f64> + Snapshot {
     /// The natural logarithm.
     #[must_use]
     fn ln(self) -> Self;
+
+    /// The natural logarithm of 1 and this number.
+    #[must_use]
+    fn ln_1p(self) -> Self;
+
+    /// The exponential function.
+    #[must_use]
+    fn exp(self) -> Self;
+
+    /// The exponential function less 1.
+    #[must_use]
+    fn exp_m1(self) -> Self;
+
+    /// This number to a power.
+    #[must_use]
+    fn pow(self, exponent: Self) -> Self;
+
+    /// The hyperbolic tangent.
+    #[must_use]
+    fn tanh(self) -> Self;
+
+    /// This magnitude with the sign of `other`.
+    #[must_use]
+    fn copysign(self, other: Self) -> Self;
 
     /// Whether it is not a number.
     #[inline(always)]
@@ -98,8 +138,15 @@ pub trait Real: Number + PartialOrd + Default + Debug + Into<f64> + Snapshot {
 }
 
 impl Number for f64 {
+    type Lane = Self;
+
     #[inline(always)]
     fn like(self, value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn each(self, value: Self) -> Self {
         value
     }
 
@@ -117,7 +164,10 @@ impl Number for f64 {
     }
 
     #[inline]
-    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
+    fn lanewise<const A: usize>(
+        arguments: [Self; A],
+        function: impl Fn([Self; A]) -> Self,
+    ) -> Self {
         function(arguments)
     }
 
@@ -145,6 +195,9 @@ impl Number for f64 {
 impl Real for f64 {
     const ZERO: Self = 0.0;
     const INFINITY: Self = Self::INFINITY;
+    const NAN: Self = Self::NAN;
+    const EPSILON: Self = Self::EPSILON;
+    const MIN_POSITIVE: Self = Self::MIN_POSITIVE;
     const HUGE: Self = 1e100;
 
     #[inline(always)]
@@ -171,12 +224,49 @@ impl Real for f64 {
     fn ln(self) -> Self {
         libm::log(self)
     }
+
+    #[inline]
+    fn ln_1p(self) -> Self {
+        libm::log1p(self)
+    }
+
+    #[inline]
+    fn exp(self) -> Self {
+        libm::exp(self)
+    }
+
+    #[inline]
+    fn exp_m1(self) -> Self {
+        libm::expm1(self)
+    }
+
+    #[inline]
+    fn pow(self, exponent: Self) -> Self {
+        libm::pow(self, exponent)
+    }
+
+    #[inline]
+    fn tanh(self) -> Self {
+        libm::tanh(self)
+    }
+
+    #[inline]
+    fn copysign(self, other: Self) -> Self {
+        libm::copysign(self, other)
+    }
 }
 
 impl Number for f32 {
+    type Lane = Self;
+
     #[inline(always)]
     fn like(self, value: f64) -> Self {
         Real::of(value)
+    }
+
+    #[inline(always)]
+    fn each(self, value: Self) -> Self {
+        value
     }
 
     #[inline(always)]
@@ -193,8 +283,11 @@ impl Number for f32 {
     }
 
     #[inline]
-    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
-        Real::of(function(arguments.map(f64::from)))
+    fn lanewise<const A: usize>(
+        arguments: [Self; A],
+        function: impl Fn([Self; A]) -> Self,
+    ) -> Self {
+        function(arguments)
     }
 
     #[inline(always)]
@@ -221,6 +314,9 @@ impl Number for f32 {
 impl Real for f32 {
     const ZERO: Self = 0.0;
     const INFINITY: Self = Self::INFINITY;
+    const NAN: Self = Self::NAN;
+    const EPSILON: Self = Self::EPSILON;
+    const MIN_POSITIVE: Self = Self::MIN_POSITIVE;
     const HUGE: Self = 1e30;
 
     #[expect(clippy::cast_possible_truncation, reason = "rounded to the nearest")]
@@ -248,5 +344,35 @@ impl Real for f32 {
     #[inline]
     fn ln(self) -> Self {
         libm::logf(self)
+    }
+
+    #[inline]
+    fn ln_1p(self) -> Self {
+        libm::log1pf(self)
+    }
+
+    #[inline]
+    fn exp(self) -> Self {
+        libm::expf(self)
+    }
+
+    #[inline]
+    fn exp_m1(self) -> Self {
+        libm::expm1f(self)
+    }
+
+    #[inline]
+    fn pow(self, exponent: Self) -> Self {
+        libm::powf(self, exponent)
+    }
+
+    #[inline]
+    fn tanh(self) -> Self {
+        libm::tanhf(self)
+    }
+
+    #[inline]
+    fn copysign(self, other: Self) -> Self {
+        libm::copysignf(self, other)
     }
 }
