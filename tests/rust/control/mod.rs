@@ -13,5 +13,6 @@ mod online_feedforward;
 mod repetitive;
 mod scheduled_pid;
 mod single_precision;
+mod single_precision_feedforward;
 mod tune;
 mod two_axes;
