@@ -224,6 +224,11 @@ pub struct CubicLag {
 }
 
 impl CubicLag {
+    /// p, a, b and c, and h/tau.
+    pub(crate) fn weights(&self) -> ([f64; 4], f64) {
+        ([self.decay, self.start, self.slopes[0], self.slopes[1]], self.rate)
+    }
+
     /// The lag with time constant `time` (s) for steps of `step` seconds.
     #[must_use]
     pub fn new(time: f64, step: f64) -> Self {
@@ -239,12 +244,14 @@ impl CubicLag {
     #[must_use]
     #[inline(always)]
     pub fn step<N: Number>(&self, output: N, start: [N; 2], end: [N; 2]) -> N {
-        let [[x0, w0], [x1, w1]] = [start, end];
-        let number = |value: f64| x1.like(value);
-        let from = (output - x1).mul_add(number(self.decay), x1);
-        let from = (x0 - x1).mul_add(number(self.start), from);
-        let from = w0.mul_add(number(self.slopes[0]), from);
-        w1.mul_add(number(self.slopes[1]), from)
+        let number = |value: f64| output.like(value);
+        let [b, c] = self.slopes;
+        cubic_lagged(
+            output,
+            start,
+            end,
+            [number(self.decay), number(self.start), number(b), number(c)],
+        )
     }
 
     /// The output's slope times the step, at an input and an output.
@@ -253,6 +260,20 @@ impl CubicLag {
     pub fn slope<N: Number>(&self, input: N, output: N) -> N {
         (input - output) * input.like(self.rate)
     }
+}
+
+/// The output after one step of a lag of which p, a, b and c are given.
+#[inline(always)]
+pub(crate) fn cubic_lagged<N: Number>(
+    output: N,
+    [x0, w0]: [N; 2],
+    [x1, w1]: [N; 2],
+    [p, a, b, c]: [N; 4],
+) -> N {
+    let from = (output - x1).mul_add(p, x1);
+    let from = (x0 - x1).mul_add(a, from);
+    let from = w0.mul_add(b, from);
+    w1.mul_add(c, from)
 }
 
 /// Moments `rate int_0^1 exp(-rate (1 - s)) s^k ds` for k from 0 to 3.

@@ -249,7 +249,10 @@ def test_the_rust_controller_in_single_precision_gives_the_same_bits_on_a_board(
 def test_a_step_of_the_rust_controller_in_single_precision_calls_no_soft_float(
     tmp_path: Path,
 ) -> None:
-    """A linker that collects garbage keeps what the function reaches, and no more."""
+    """A linker that collects garbage keeps what the function reaches, and no more.
+
+    `parts_volts` steps every law and every inverse that can be in single precision.
+    """
     library = rust_library(tmp_path, THUMB)
 
     def reached(function: str) -> set[str]:
@@ -268,7 +271,7 @@ def test_a_step_of_the_rust_controller_in_single_precision_calls_no_soft_float(
         return {one for one in names if re.match(r"__aeabi_(c?[df]|u?[il]2[df]|u?l2[df])", one)}
 
     assert {"__aeabi_dadd", "__aeabi_dmul"} <= reached("axis_volts")
-    for function in ("single_volts", "single_gave", "single_forget"):
+    for function in ("single_volts", "single_gave", "single_forget", "parts_volts"):
         assert not reached(function), function
 
 

@@ -2,6 +2,8 @@
 //! board.
 #![no_std]
 
+mod parts;
+
 use core::panic::PanicInfo;
 
 use piezotrack_control::pid::{PidState, SampledPid};

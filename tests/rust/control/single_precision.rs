@@ -8,10 +8,11 @@
 
 use core::f64::consts::TAU;
 
+use piezotrack_control::hysteresis::{BoucWen, Dahl};
 use piezotrack_control::{
     Cast, Command, Controller, ControllerState, DisturbanceObserver, Feedback, FeedbackSample,
-    Filter, IntegralResonantControl, LeadLag, Limits, Pid, Real, Repetitive, SampledPid,
-    ScheduledPid, SlidingMode, Smoothing, Snapshot, Span, StateSpace,
+    Filter, HysteresisObserver, IntegralResonantControl, LeadLag, Limits, Pid, Real, Repetitive,
+    SampledPid, ScheduledPid, SlidingMode, Smoothing, Snapshot, Span, StateSpace,
 };
 
 const DT: f64 = 1e-3;
@@ -359,6 +360,12 @@ fn every_law_follows_in_single_precision() {
     both(pid());
     both(observer.around((), DT).unwrap());
     both(resonant.around(pid(), DT).unwrap());
+    let friction = Dahl { a1: 1e3, a2: 1e6, gain: 2e9 };
+    let observer = HysteresisObserver::new(friction, GAIN, 2e-3, 0.1, 100e-6).unwrap();
+    both(observer.around(pid(), DT).unwrap());
+    let drive = BoucWen { rise: 0.1, beta: 0.04, gamma: 0.03, exponent: 1.0 };
+    let observer = HysteresisObserver::new(drive, GAIN, 2e-3, 0.1, 100e-6).unwrap();
+    both(observer.around(pid(), DT).unwrap());
     both(SlidingMode::new(5.0, 20e-6, 0.02, 0.0, 0.0).unwrap().at(DT).unwrap());
     both::<StateSpace<2>>(LeadLag::new(2e5, 0.001, 0.002).unwrap().at(DT).unwrap());
 }
