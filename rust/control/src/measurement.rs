@@ -58,7 +58,7 @@ impl Span {
     }
 }
 
-/// What is within the span is within the one that it becomes, rounded as well.
+/// Ends rounded as readings are: one within the span stays within it.
 impl Cast for Span {
     type In<T: Real> = Span<T>;
 

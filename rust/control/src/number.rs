@@ -74,7 +74,7 @@ pub trait Real: Number<Lane = Self> + PartialOrd + Default + Debug + Into<f64> +
     const EPSILON: Self;
     /// The smallest number above 0 with all its digits.
     const MIN_POSITIVE: Self;
-    /// Numbers this far from 0 soon overflow, and enter no state.
+    /// Numbers this far from 0 soon overflow, and enter no state: 1e100, 1e30 in single precision.
     const HUGE: Self;
 
     /// The number nearest to `value`.
