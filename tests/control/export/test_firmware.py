@@ -256,7 +256,8 @@ def test_a_step_of_the_rust_controller_in_single_precision_calls_no_soft_float(
     library = rust_library(tmp_path, THUMB)
 
     def reached(function: str) -> set[str]:
-        linker = ["arm-none-eabi-ld", "--gc-sections", "-e", function, library, "-o", "reached"]
+        archive = str(library)
+        linker = ["arm-none-eabi-ld", "--gc-sections", "-e", function, archive, "-o", "reached"]
         subprocess.run(linker, cwd=tmp_path, check=True)
         done = subprocess.run(
             ["arm-none-eabi-nm", "reached"],
