@@ -58,11 +58,12 @@ const MODELS: [&str; 14] = [
 ];
 
 /// From the bottom up.
-const CONTROL: [&str; 28] = [
+const CONTROL: [&str; 29] = [
     "error",
-    "number",
-    "unfused",
     "snapshot",
+    "number",
+    "cast",
+    "unfused",
     "root",
     "cubic_motion",
     "cubic_segment",

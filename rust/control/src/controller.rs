@@ -7,11 +7,13 @@
 //! Xu and Li 2010, section 4, doi 10.1115/1.4001712, with the corrections described in
 //! [`crate::pid`] and [`crate::repetitive`].
 
-use crate::error::{Error, Result, check, usable};
+use crate::cast::Cast;
+use crate::error::{Error, Result, check};
 use crate::feedback_law::{Feedback, FeedbackSample};
 use crate::filters::{Filter, FilterState};
 use crate::limits::Limits;
 use crate::measurement::{Readings, Refused, Span};
+use crate::number::Real;
 use crate::repetitive::{Outcome, RepetitiveState, SampledRepetitive};
 use crate::snapshot::Snapshot;
 
@@ -30,46 +32,46 @@ use crate::snapshot::Snapshot;
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Controller<F> {
+pub struct Controller<F, T = f64> {
     /// Range of the actuator.
-    pub limits: Limits,
+    pub limits: Limits<T>,
     /// Displacements that the stage can have: what is beyond is no measurement.
-    pub span: Span,
+    pub span: Span<T>,
     /// The feedback law; `()` for none.
     pub feedback: F,
     /// The repetitive part.
-    pub repetitive: Option<SampledRepetitive>,
+    pub repetitive: Option<SampledRepetitive<T>>,
     /// Filters of the measurement, one after the other.
-    pub filters: [Option<Filter>; 2],
+    pub filters: [Option<Filter<T>>; 2],
 }
 
-/// State of a [`Controller`]; `L` is the delay line of the repetitive part, `[f64; 0]` for a
+/// State of a [`Controller`]; `L` is the delay line of the repetitive part, `[T; 0]` for a
 /// controller without one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ControllerState<S, L> {
+pub struct ControllerState<S, L, T = f64> {
     feedback: S,
-    repetitive: Option<RepetitiveState<L>>,
-    filters: [FilterState; 2],
+    repetitive: Option<RepetitiveState<L, T>>,
+    filters: [FilterState<T>; 2],
     /// Voltage to continue from at the next step, V.
-    present: Option<f64>,
+    present: Option<T>,
     /// Whether there was a step since the start.
     stepped: bool,
     /// The last command.
-    last: Command,
+    last: Command<T>,
     /// Applied voltage less the unclipped command, eu, V.
-    excess: f64,
+    excess: T,
     /// Whether that is from a voltage that was reported.
     reported: bool,
     /// Whether the next sample is the first after a start or a reported voltage.
     apart: bool,
     /// Tracking error of the last sample, which the repetitive part has yet to store, m.
-    unlearnt: f64,
-    readings: Readings,
+    unlearnt: T,
+    readings: Readings<T>,
 }
 
 crate::snapshot!(
-    [S: Snapshot, L: AsRef<[f64]> + AsMut<[f64]>]
-    ControllerState<S, L> {
+    [S: Snapshot, T: Real, L: AsRef<[T]> + AsMut<[T]>]
+    ControllerState<S, L, T> {
         feedback,
         repetitive,
         filters,
@@ -90,19 +92,19 @@ const READING: f64 = 0.01;
 
 /// The command of a controller at one sample, with its parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Command {
+pub struct Command<T = f64> {
     /// The voltage for the actuator, within the limits, V.
-    pub volts: f64,
+    pub volts: T,
     /// The voltage before it was clipped, V.
-    pub unclipped: f64,
+    pub unclipped: T,
     /// Its feedforward part uFF, V.
-    pub feedforward: f64,
+    pub feedforward: T,
     /// Its feedback part uFB, V.
-    pub feedback: f64,
+    pub feedback: T,
     /// Its repetitive part uRC, V.
-    pub repetitive: f64,
+    pub repetitive: T,
     /// The tracking error used: reference less filtered measurement, m.
-    pub error: f64,
+    pub error: T,
     /// Whether the voltage was clipped.
     pub saturated: bool,
     /// False where the measurement was not finite, outside the span, or a jump too far.
@@ -112,22 +114,44 @@ pub struct Command {
     pub reference_ok: bool,
 }
 
-crate::snapshot!(Command {
-    volts,
-    unclipped,
-    feedforward,
-    feedback,
-    repetitive,
-    error,
-    saturated,
-    measurement_ok,
-    reference_ok
-});
+crate::snapshot!(
+    [T: Real]
+    Command<T> {
+        volts,
+        unclipped,
+        feedforward,
+        feedback,
+        repetitive,
+        error,
+        saturated,
+        measurement_ok,
+        reference_ok
+    }
+);
 
-impl<F: Feedback> Controller<F> {
+/// Limits, span, law, repetitive part and filters, each in the other type.
+impl<F: Cast> Cast for Controller<F> {
+    type In<T: Real> = Controller<F::In<T>, T>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        let mut filters = [None; 2];
+        for (slot, filter) in filters.iter_mut().zip(&self.filters) {
+            *slot = filter.as_ref().map(Filter::cast).transpose()?;
+        }
+        Ok(Controller {
+            limits: self.limits.cast()?,
+            span: self.span.cast()?,
+            feedback: self.feedback.cast()?,
+            repetitive: self.repetitive.as_ref().map(SampledRepetitive::cast).transpose()?,
+            filters,
+        })
+    }
+}
+
+impl<F: Feedback<T>, T: Real> Controller<F, T> {
     /// A controller of limits and feedback only; set the public fields for more.
     #[must_use]
-    pub fn new(limits: Limits, feedback: F) -> Self {
+    pub fn new(limits: Limits<T>, feedback: F) -> Self {
         Self { limits, span: Span::default(), feedback, repetitive: None, filters: [None; 2] }
     }
 
@@ -137,7 +161,7 @@ impl<F: Feedback> Controller<F> {
     ///
     /// # Errors
     /// Names `line` where it is too short for the repetitive part.
-    pub fn rest<L: AsMut<[f64]>>(&self, line: L) -> Result<ControllerState<F::State, L>> {
+    pub fn rest<L: AsMut<[T]>>(&self, line: L) -> Result<ControllerState<F::State, L, T>> {
         let repetitive = match &self.repetitive {
             Some(part) => Some(part.rest(line)?),
             None => None,
@@ -148,11 +172,11 @@ impl<F: Feedback> Controller<F> {
             filters: [None; 2],
             present: None,
             stepped: false,
-            last: Command { volts: self.limits.clip(0.0), ..Command::default() },
-            excess: 0.0,
+            last: Command { volts: self.limits.clip(T::ZERO), ..Command::default() },
+            excess: T::ZERO,
             reported: false,
             apart: true,
-            unlearnt: 0.0,
+            unlearnt: T::ZERO,
             readings: Readings::NONE,
         })
     }
@@ -163,13 +187,13 @@ impl<F: Feedback> Controller<F> {
     ///
     /// # Errors
     /// Names `present` where it is outside the limits, `line` as in [`Self::rest`].
-    pub fn start<L: AsMut<[f64]>>(
+    pub fn start<L: AsMut<[T]>>(
         &self,
-        present: f64,
+        present: T,
         line: L,
-    ) -> Result<ControllerState<F::State, L>> {
+    ) -> Result<ControllerState<F::State, L, T>> {
         let right = (self.limits.low()..=self.limits.high()).contains(&present);
-        check("present", present, "V", right, "a voltage within the limits")?;
+        check("present", present.into(), "V", right, "a voltage within the limits")?;
         let mut state = self.rest(line)?;
         state.present = Some(present);
         state.last.volts = present;
@@ -181,7 +205,7 @@ impl<F: Feedback> Controller<F> {
     ///
     /// Without feedback there is nothing that could hold the voltage: it is the feedforward then.
     /// A law without an integrator holds it as a constant part of its output.
-    pub fn reset<L: AsMut<[f64]>>(&self, state: &mut ControllerState<F::State, L>) {
+    pub fn reset<L: AsMut<[T]>>(&self, state: &mut ControllerState<F::State, L, T>) {
         if let (Some(part), Some(memory)) = (&self.repetitive, &mut state.repetitive) {
             part.reset(memory);
         }
@@ -193,8 +217,8 @@ impl<F: Feedback> Controller<F> {
         state.filters = [None; 2];
         state.last = Command { volts: present, ..Command::default() };
         state.stepped = false;
-        (state.excess, state.reported, state.apart) = (0.0, false, true);
-        state.unlearnt = 0.0;
+        (state.excess, state.reported, state.apart) = (T::ZERO, false, true);
+        state.unlearnt = T::ZERO;
         state.readings = Readings::NONE;
     }
 
@@ -207,10 +231,10 @@ impl<F: Feedback> Controller<F> {
     ///
     /// # Errors
     /// Names `repetitive` where the two have not the same period and lines; nothing is changed.
-    pub fn retune<L: AsMut<[f64]>>(
+    pub fn retune<L: AsMut<[T]>>(
         &self,
         next: &Self,
-        state: &mut ControllerState<F::State, L>,
+        state: &mut ControllerState<F::State, L, T>,
     ) -> Result<()> {
         let mine = self.repetitive.as_ref().map(SampledRepetitive::memory);
         let others = next.repetitive.as_ref().map(SampledRepetitive::memory);
@@ -244,25 +268,25 @@ impl<F: Feedback> Controller<F> {
     /// valid feedforward the last one is held; of one far outside the limits, as much is used as
     /// reaches from one limit beyond the other by the range between them.
     #[inline]
-    pub fn step<L: AsMut<[f64]>>(
+    pub fn step<L: AsMut<[T]>>(
         &self,
-        state: &mut ControllerState<F::State, L>,
-        reference: f64,
-        measured: f64,
-        feedforward: f64,
-    ) -> Command {
+        state: &mut ControllerState<F::State, L, T>,
+        reference: T,
+        measured: T,
+        feedforward: T,
+    ) -> Command<T> {
         self.advance(state, reference, measured, feedforward);
         // Here, so that what the caller does not use of it is not copied.
         state.last
     }
 
     /// Computes the last command of the state.
-    fn advance<L: AsMut<[f64]>>(
+    fn advance<L: AsMut<[T]>>(
         &self,
-        state: &mut ControllerState<F::State, L>,
-        reference: f64,
-        measured: f64,
-        feedforward: f64,
+        state: &mut ControllerState<F::State, L, T>,
+        reference: T,
+        measured: T,
+        feedforward: T,
     ) {
         let measurement_ok = self.span.accepts(&mut state.readings, measured);
         let reference_fits = self.span.may_ask_for(reference);
@@ -282,16 +306,16 @@ impl<F: Feedback> Controller<F> {
                 let before = Outcome { error: state.unlearnt, excess: learns };
                 part.step(memory, before, high - low)
             }
-            _ => 0.0,
+            _ => T::ZERO,
         };
         let mut feedback = last.feedback;
         if let Some(present) = present {
             feedback = present - used - repetitive;
             state.feedback = self.feedback.start(feedback);
-            state.excess = 0.0;
+            state.excess = T::ZERO;
         }
         let mut error = last.error;
-        state.unlearnt = 0.0;
+        state.unlearnt = T::ZERO;
         if measurement_ok && reference_fits {
             let measured = self.filtered(&mut state.filters, measured);
             error = reference - measured;
@@ -314,7 +338,7 @@ impl<F: Feedback> Controller<F> {
             feedback,
             repetitive,
             error,
-            saturated: state.excess.abs() > 0.0,
+            saturated: state.excess.abs() > T::ZERO,
             measurement_ok,
             reference_ok: reference_fits && feedforward_ok,
         };
@@ -322,22 +346,17 @@ impl<F: Feedback> Controller<F> {
 
     /// Whether a feedforward far outside the limits is valid, and what is used in its place.
     #[inline]
-    fn far_feedforward(&self, feedforward: f64, last: f64) -> (bool, f64) {
-        let (low, high) = (self.limits.low(), self.limits.high());
-        if usable(feedforward) {
-            (true, feedforward.max(low - (high - low)).min(high + (high - low)))
-        } else {
-            (false, last)
-        }
+    fn far_feedforward(&self, feedforward: T, last: T) -> (bool, T) {
+        if feedforward.is_usable() { (true, self.near(feedforward)) } else { (false, last) }
     }
 
     /// At the first sample after a start or a reported voltage: the voltage to start the feedback
     /// from, if any, and the excess that the repetitive part is told.
     #[inline]
-    fn first<L>(&self, state: &mut ControllerState<F::State, L>) -> (Option<f64>, f64) {
+    fn first<L>(&self, state: &mut ControllerState<F::State, L, T>) -> (Option<T>, T) {
         let range = self.limits.high() - self.limits.low();
-        let accurate = state.reported && state.excess.abs() <= READING * range;
-        let excess = if accurate { 0.0 } else { state.excess };
+        let accurate = state.reported && state.excess.abs() <= T::of(READING) * range;
+        let excess = if accurate { T::ZERO } else { state.excess };
         (state.stepped, state.reported, state.apart) = (true, false, false);
         (state.present.take().filter(|_| self.feedback.holds()), excess)
     }
@@ -352,8 +371,11 @@ impl<F: Feedback> Controller<F> {
     ///
     /// # Errors
     /// Names `volts` where it is not finite; nothing is changed then.
-    pub fn applied<L>(&self, state: &mut ControllerState<F::State, L>, volts: f64) -> Result<()> {
-        check("volts", volts, "V", volts.is_finite(), "the voltage that the actuator got")?;
+    pub fn applied<L>(&self, state: &mut ControllerState<F::State, L, T>, volts: T) -> Result<()> {
+        if !volts.is_finite() {
+            let expected = "the voltage that the actuator got";
+            return Err(Error { name: "volts", value: volts.into(), unit: "V", expected });
+        }
         let range = self.limits.high() - self.limits.low();
         let near = volts >= self.limits.low() - range && volts <= self.limits.high() + range;
         if state.stepped && near {
@@ -370,25 +392,25 @@ impl<F: Feedback> Controller<F> {
     /// saturated amplifier, not beyond the voltage that was applied, which may have been outside of
     /// the limits. `None` where that is all of it.
     #[must_use]
-    pub fn reached<L>(&self, state: &ControllerState<F::State, L>) -> Option<f64> {
+    pub fn reached<L>(&self, state: &ControllerState<F::State, L, T>) -> Option<T> {
         let (asked, excess) = (state.last.feedforward, state.excess);
         let mut reached = self.limits.clip(asked);
-        if excess.abs() > READING * (self.limits.high() - self.limits.low()) {
+        if excess.abs() > T::of(READING) * (self.limits.high() - self.limits.low()) {
             // Not from the excess, which of a huge command has lost the voltage to rounding.
             let volts = if state.reported { self.near(state.voltage()) } else { state.last.volts };
-            reached = if excess < 0.0 { reached.min(volts) } else { reached.max(volts) };
+            reached = if excess < T::ZERO { reached.smaller(volts) } else { reached.larger(volts) };
         }
-        ((reached - asked).abs() > 0.0).then_some(reached)
+        ((reached - asked).abs() > T::ZERO).then_some(reached)
     }
 
     /// A voltage, outside the limits by the range between them at most.
-    fn near(&self, volts: f64) -> f64 {
+    fn near(&self, volts: T) -> T {
         let (low, high) = (self.limits.low(), self.limits.high());
-        volts.max(low - (high - low)).min(high + (high - low))
+        volts.larger(low - (high - low)).smaller(high + (high - low))
     }
 
     #[inline]
-    fn filtered(&self, states: &mut [FilterState; 2], measured: f64) -> f64 {
+    fn filtered(&self, states: &mut [FilterState<T>; 2], measured: T) -> T {
         let mut value = measured;
         for (filter, state) in self.filters.iter().zip(states) {
             if let Some(filter) = filter {
@@ -399,10 +421,10 @@ impl<F: Feedback> Controller<F> {
     }
 }
 
-impl<S, L> ControllerState<S, L> {
+impl<S, L, T: Real> ControllerState<S, L, T> {
     /// The last command.
     #[must_use]
-    pub fn last(&self) -> &Command {
+    pub fn last(&self) -> &Command<T> {
         &self.last
     }
 
@@ -414,12 +436,12 @@ impl<S, L> ControllerState<S, L> {
 
     /// The last valid measurement, m, if there was one.
     #[must_use]
-    pub fn measured(&self) -> Option<f64> {
+    pub fn measured(&self) -> Option<T> {
         self.readings.last()
     }
 
     /// The voltage at the actuator: the last command, or what was reported as applied, V.
-    fn voltage(&self) -> f64 {
+    fn voltage(&self) -> T {
         if self.stepped { self.last.unclipped + self.excess } else { self.last.volts }
     }
 }

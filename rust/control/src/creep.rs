@@ -23,8 +23,9 @@
 //! The relaxations are passed as slices, so that a model with room for more of them (the
 //! simulation's) and one of fixed size (the firmware's) run the same code.
 
+use crate::cast::{Cast, all_rounded, rounded};
 use crate::error::{Error, Result, not_negative, positive};
-use crate::number::Number;
+use crate::number::{Number, Real};
 
 /// One relaxation of the creep.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,26 +57,32 @@ impl Lag {
     #[must_use]
     #[inline(always)]
     pub fn step<N: Number>(&self, output: N, end: N, rise: N) -> N {
-        // Behind a ramp the output lags by `trail` in the end; the rest of the gap decays.
-        let trail = rise * rise.like(self.ratio);
-        end - ((end - rise - output - trail) * rise.like(self.decay) + trail)
+        lagged(output, end, rise, [rise.like(self.decay), rise.like(self.ratio)])
     }
+}
+
+/// The output after one step of a lag, of exp(-T/tau) and tau/T.
+#[inline(always)]
+fn lagged<N: Number>(output: N, end: N, rise: N, [decay, ratio]: [N; 2]) -> N {
+    // Behind a ramp the output lags by `trail` in the end; the rest of the gap decays.
+    let trail = rise * ratio;
+    end - ((end - rise - output - trail) * decay + trail)
 }
 
 /// State of the creep: its input, and the output of each relaxation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CreepState<const N: usize> {
+pub struct CreepState<const N: usize, T = f64> {
     /// Input h, m.
-    pub input: f64,
+    pub input: T,
     /// Output of each relaxation, q, m.
-    pub reached: [f64; N],
+    pub reached: [T; N],
 }
 
-crate::snapshot!([const N: usize] CreepState<N> { input, reached });
+crate::snapshot!([const N: usize, T: Real] CreepState<N, T> { input, reached });
 
-impl<const N: usize> Default for CreepState<N> {
+impl<const N: usize, T: Real> Default for CreepState<N, T> {
     fn default() -> Self {
-        Self { input: 0.0, reached: [0.0; N] }
+        Self { input: T::ZERO, reached: [T::ZERO; N] }
     }
 }
 
@@ -114,13 +121,15 @@ pub fn advance<N: Number>(lags: &[Lag], reached: &mut [N], from: N, to: N) {
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CreepInverse<const N: usize> {
-    creep: [Creep; N],
-    lags: [Lag; N],
+pub struct CreepInverse<const N: usize, T = f64> {
+    /// c.
+    shares: [T; N],
+    /// exp(-T/tau) and tau/T.
+    lags: [[T; 2]; N],
     /// How many of them are in use.
     count: usize,
     /// g.
-    gain: f64,
+    gain: T,
 }
 
 impl<const N: usize> CreepInverse<N> {
@@ -146,28 +155,48 @@ impl<const N: usize> CreepInverse<N> {
         for (one, lag) in used.iter().zip(&lags).take(creep.len()) {
             gain += one.share * lag.step(0.0, 1.0, 1.0);
         }
-        Ok(Self { creep: used, lags, count: creep.len(), gain })
+        let lags = lags.map(|one| [one.decay, one.ratio]);
+        Ok(Self { shares: used.map(|one| one.share), lags, count: creep.len(), gain })
     }
+}
 
+impl<const N: usize> Cast for CreepInverse<N> {
+    type In<T: Real> = CreepInverse<N, T>;
+
+    fn cast<T: Real>(&self) -> Result<CreepInverse<N, T>> {
+        let mut lags = [[T::ZERO; 2]; N];
+        for (slot, lag) in lags.iter_mut().zip(&self.lags) {
+            *slot = all_rounded("creep_times", lag, "")?;
+        }
+        let shares = all_rounded("creep_weights", &self.shares, "")?;
+        let gain = rounded("creep_weights", self.gain, "")?;
+        Ok(CreepInverse { shares, lags, count: self.count, gain })
+    }
+}
+
+impl<const N: usize, T: Real> CreepInverse<N, T> {
     /// The input (m) at the end of the next step for which the displacement is `target` (m) there.
     #[inline]
-    pub fn step(&self, state: &mut CreepState<N>, target: f64) -> f64 {
-        let used = self.creep.iter().zip(&self.lags).zip(&state.reached).take(self.count);
-        let fixed = used.fold(0.0, |sum, ((creep, lag), &reached)| {
-            sum + creep.share * lag.step(reached, 0.0, -state.input)
+    pub fn step(&self, state: &mut CreepState<N, T>, target: T) -> T {
+        let used = self.shares.iter().zip(&self.lags).zip(&state.reached).take(self.count);
+        let fixed = used.fold(T::ZERO, |sum, ((share, lag), &reached)| {
+            sum + *share * lagged(reached, T::ZERO, -state.input, *lag)
         });
         let input = (target - fixed) / self.gain;
-        let lags = self.lags.get(..self.count).unwrap_or_default();
-        advance(lags, &mut state.reached, state.input, input);
+        let rise = input - state.input;
+        for (reached, lag) in state.reached.iter_mut().zip(&self.lags).take(self.count) {
+            *reached = lagged(*reached, input, rise, *lag);
+        }
         state.input = input;
         input
     }
 
     /// The input (m) for which the displacement jumps to `target` (m), without time to creep.
     #[inline]
-    pub fn jump(&self, state: &mut CreepState<N>, target: f64) -> f64 {
-        let used = self.creep.get(..self.count).unwrap_or_default();
-        let input = target - output(used, 0.0, &state.reached);
+    pub fn jump(&self, state: &mut CreepState<N, T>, target: T) -> T {
+        let crept = self.shares.iter().zip(&state.reached).take(self.count);
+        let crept = crept.fold(T::ZERO, |sum, (share, reached)| sum + *share * *reached);
+        let input = target - crept;
         state.input = input;
         input
     }
@@ -195,6 +224,11 @@ pub struct CubicLag {
 }
 
 impl CubicLag {
+    /// p, a, b and c, and h/tau.
+    pub(crate) fn weights(&self) -> ([f64; 4], f64) {
+        ([self.decay, self.start, self.slopes[0], self.slopes[1]], self.rate)
+    }
+
     /// The lag with time constant `time` (s) for steps of `step` seconds.
     #[must_use]
     pub fn new(time: f64, step: f64) -> Self {
@@ -210,12 +244,14 @@ impl CubicLag {
     #[must_use]
     #[inline(always)]
     pub fn step<N: Number>(&self, output: N, start: [N; 2], end: [N; 2]) -> N {
-        let [[x0, w0], [x1, w1]] = [start, end];
-        let number = |value: f64| x1.like(value);
-        let from = (output - x1).mul_add(number(self.decay), x1);
-        let from = (x0 - x1).mul_add(number(self.start), from);
-        let from = w0.mul_add(number(self.slopes[0]), from);
-        w1.mul_add(number(self.slopes[1]), from)
+        let number = |value: f64| output.like(value);
+        let [b, c] = self.slopes;
+        cubic_lagged(
+            output,
+            start,
+            end,
+            [number(self.decay), number(self.start), number(b), number(c)],
+        )
     }
 
     /// The output's slope times the step, at an input and an output.
@@ -224,6 +260,20 @@ impl CubicLag {
     pub fn slope<N: Number>(&self, input: N, output: N) -> N {
         (input - output) * input.like(self.rate)
     }
+}
+
+/// The output after one step of a lag of which p, a, b and c are given.
+#[inline(always)]
+pub(crate) fn cubic_lagged<N: Number>(
+    output: N,
+    [x0, w0]: [N; 2],
+    [x1, w1]: [N; 2],
+    [p, a, b, c]: [N; 4],
+) -> N {
+    let from = (output - x1).mul_add(p, x1);
+    let from = (x0 - x1).mul_add(a, from);
+    let from = w0.mul_add(b, from);
+    w1.mul_add(c, from)
 }
 
 /// Moments `rate int_0^1 exp(-rate (1 - s)) s^k ds` for k from 0 to 3.

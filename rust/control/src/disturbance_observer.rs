@@ -25,8 +25,10 @@
 
 use core::f64::consts::TAU;
 
+use crate::cast::{Cast, rounded};
 use crate::error::{Result, check, finite, not_negative, positive};
 use crate::feedback_law::{Feedback, FeedbackSample};
+use crate::number::Real;
 
 /// Nominal plant and filter of an observer, in continuous time.
 ///
@@ -87,35 +89,49 @@ impl DisturbanceObserver {
 /// A feedback law with a disturbance observer, for one sampling interval; see
 /// [`DisturbanceObserver::around`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observed<F> {
+pub struct Observed<F, T = f64> {
     inner: F,
     /// 1 - q.
-    fresh: f64,
+    fresh: T,
     /// p.
-    pole: f64,
+    pole: T,
     /// 1/(g (1 - p)), V/m.
-    inverse: f64,
+    inverse: T,
 }
 
 /// State of an [`Observed`] law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObservedState<S> {
+pub struct ObservedState<S, T = f64> {
     inner: S,
     /// d, V.
-    disturbance: f64,
+    disturbance: T,
     /// Error (m) and feedforward (V) of the last sample; `None` before the first.
-    last: Option<[f64; 2]>,
+    last: Option<[T; 2]>,
     /// Voltage to begin with, V.
-    first: Option<f64>,
+    first: Option<T>,
     /// The last output, V.
-    volts: f64,
+    volts: T,
 }
 
 crate::snapshot!(
-    [S: crate::Snapshot] ObservedState<S> { inner, disturbance, last, first, volts }
+    [S: crate::Snapshot, T: Real]
+    ObservedState<S, T> { inner, disturbance, last, first, volts }
 );
 
-impl<F> Observed<F> {
+impl<F: Cast> Cast for Observed<F> {
+    type In<T: Real> = Observed<F::In<T>, T>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        Ok(Observed {
+            inner: self.inner.cast()?,
+            fresh: rounded("cutoff", self.fresh, "")?,
+            pole: rounded("plant_time", self.pole, "")?,
+            inverse: rounded("plant_gain", self.inverse, "V/m")?,
+        })
+    }
+}
+
+impl<F, T: Real> Observed<F, T> {
     /// The law inside.
     #[must_use]
     pub fn inner(&self) -> &F {
@@ -124,31 +140,30 @@ impl<F> Observed<F> {
 
     /// 1 - q, p and 1/(g (1 - p)) in V/m.
     #[must_use]
-    pub fn coefficients(&self) -> [f64; 3] {
+    pub fn coefficients(&self) -> [T; 3] {
         [self.fresh, self.pole, self.inverse]
     }
 }
 
-impl<F: Feedback> Feedback for Observed<F> {
-    type State = ObservedState<F::State>;
+impl<F: Feedback<T>, T: Real> Feedback<T> for Observed<F, T> {
+    type State = ObservedState<F::State, T>;
 
     fn rest(&self) -> Self::State {
         let inner = self.inner.rest();
-        ObservedState { inner, disturbance: 0.0, last: None, first: None, volts: 0.0 }
+        ObservedState { inner, disturbance: T::ZERO, last: None, first: None, volts: T::ZERO }
     }
 
-    fn start(&self, volts: f64) -> Self::State {
+    fn start(&self, volts: T) -> Self::State {
         ObservedState { first: Some(volts), volts, ..self.rest() }
     }
 
     fn adopt(&self, before: &Self, state: &mut Self::State) -> bool {
-        let pairs = self.coefficients().into_iter().zip(before.coefficients());
-        let same = pairs.into_iter().all(|(one, other)| one.to_bits() == other.to_bits());
+        let same = self.coefficients() == before.coefficients();
         same && self.inner.adopt(&before.inner, &mut state.inner)
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, sample: &FeedbackSample) -> f64 {
+    fn step(&self, state: &mut Self::State, sample: &FeedbackSample<T>) -> T {
         let FeedbackSample { error, excess, applied, feedforward, .. } = *sample;
         if let Some([before, forward]) = state.last {
             let needed = -self.inverse * (error - self.pole * before);
@@ -156,7 +171,7 @@ impl<F: Feedback> Feedback for Observed<F> {
             let step = self.fresh * (found - state.disturbance);
             let next = state.disturbance + step;
             // One that gets smaller may step: it could keep the command clipped for ever otherwise.
-            let outward = excess * step > 0.0 && next.abs() > state.disturbance.abs();
+            let outward = excess * step > T::ZERO && next.abs() > state.disturbance.abs();
             state.disturbance = if outward { state.disturbance } else { next };
         }
         let inside = self.inner.step(&mut state.inner, sample);
@@ -170,7 +185,7 @@ impl<F: Feedback> Feedback for Observed<F> {
             state.volts = volts;
         } else {
             // Overflow: hold the output, and observe again from the next sample on.
-            (state.disturbance, state.last) = (0.0, None);
+            (state.disturbance, state.last) = (T::ZERO, None);
         }
         state.volts
     }

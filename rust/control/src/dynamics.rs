@@ -12,7 +12,9 @@
 
 use core::f64::consts::TAU;
 
+use crate::cast::{Cast, rounded};
 use crate::error::{Error, Result, check, not_negative, positive};
+use crate::number::Real;
 
 /// Most modes in parallel.
 pub const MOST_MODES: usize = 4;
@@ -146,14 +148,64 @@ impl Dynamics {
     #[must_use]
     #[inline]
     pub fn inverse(&self, x: f64, v: f64, a: f64) -> f64 {
+        Derivatives::of(self).inverse(x, v, a)
+    }
+}
+
+/// The inverse of dynamics that needs the derivatives of the reference only.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Derivatives<T = f64> {
+    /// That of none.
+    None,
+    /// T, s.
+    First { time: T },
+    /// 2 zeta, and wn in rad/s.
+    Second { twice: T, natural: T },
+    /// There is none of several modes.
+    Modes,
+}
+
+impl Derivatives {
+    #[inline]
+    pub(crate) fn of(dynamics: &Dynamics) -> Self {
+        match *dynamics {
+            Dynamics::None => Self::None,
+            Dynamics::First { time } => Self::First { time },
+            Dynamics::Second { frequency, damping_ratio } => {
+                Self::Second { twice: 2.0 * damping_ratio, natural: TAU * frequency }
+            }
+            Dynamics::Modes(_) => Self::Modes,
+        }
+    }
+}
+
+impl Cast for Derivatives {
+    type In<T: Real> = Derivatives<T>;
+
+    fn cast<T: Real>(&self) -> Result<Derivatives<T>> {
+        Ok(match *self {
+            Self::None => Derivatives::None,
+            Self::First { time } => {
+                Derivatives::First { time: rounded("time_constant", time, "s")? }
+            }
+            Self::Second { twice, natural } => Derivatives::Second {
+                twice: rounded("damping_ratio", twice, "")?,
+                natural: rounded("frequency", natural, "rad/s")?,
+            },
+            Self::Modes => Derivatives::Modes,
+        })
+    }
+}
+
+impl<T: Real> Derivatives<T> {
+    /// The input, as [`Dynamics::inverse`].
+    #[inline]
+    pub(crate) fn inverse(&self, x: T, v: T, a: T) -> T {
         match *self {
             Self::None => x,
             Self::First { time } => x + time * v,
-            Self::Second { frequency, damping_ratio } => {
-                let natural = TAU * frequency;
-                x + (2.0 * damping_ratio * v + a / natural) / natural
-            }
-            Self::Modes(_) => f64::NAN,
+            Self::Second { twice, natural } => x + (twice * v + a / natural) / natural,
+            Self::Modes => T::NAN,
         }
     }
 }

@@ -5,7 +5,9 @@
 
 use core::f64::consts::{PI, TAU};
 
+use crate::cast::{Cast, all_rounded};
 use crate::error::{Result, check, not_negative, positive};
+use crate::number::Real;
 
 /// A filter of first or second order, for one sampling interval.
 ///
@@ -22,13 +24,13 @@ use crate::error::{Result, check, not_negative, positive};
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Filter {
-    b: [f64; 3],
-    a: [f64; 2],
+pub struct Filter<T = f64> {
+    b: [T; 3],
+    a: [T; 2],
 }
 
 /// State of a [`Filter`]; `None` before the first sample.
-pub type FilterState = Option<[f64; 2]>;
+pub type FilterState<T = f64> = Option<[T; 2]>;
 
 impl Filter {
     /// `1/(1 + s/wc)`, wc = 2 pi `cutoff` (Hz), sampled every `dt` seconds.
@@ -88,16 +90,27 @@ impl Filter {
     pub(crate) fn of(b: [f64; 3], a: [f64; 2]) -> Self {
         Self { b, a }
     }
+}
 
+impl Cast for Filter {
+    type In<T: Real> = Filter<T>;
+
+    fn cast<T: Real>(&self) -> Result<Filter<T>> {
+        let (name, unit) = ("filter", "");
+        Ok(Filter { b: all_rounded(name, &self.b, unit)?, a: all_rounded(name, &self.a, unit)? })
+    }
+}
+
+impl<T: Real> Filter<T> {
     /// `[b0, b1, b2]` and `[a1, a2]` of the recursion.
     #[must_use]
-    pub fn coefficients(&self) -> ([f64; 3], [f64; 2]) {
+    pub fn coefficients(&self) -> ([T; 3], [T; 2]) {
         (self.b, self.a)
     }
 
     /// The filtered value of `input`, in its unit.
     #[inline]
-    pub fn step(&self, state: &mut FilterState, input: f64) -> f64 {
+    pub fn step(&self, state: &mut FilterState<T>, input: T) -> T {
         let Self { b: [b0, b1, b2], a: [a1, a2] } = *self;
         let Some([s1, s2]) = *state else {
             *state = Some([input - b0 * input, (b2 - a2) * input]);

@@ -20,9 +20,11 @@
 //! slope. The compensation takes the place of a feedforward by the inverse of the hysteresis, which
 //! would compensate it twice; a linear feedforward r/g, or none, goes with it.
 
+use crate::cast::{Cast, all_rounded, rounded};
 use crate::error::{Result, check, finite, not_negative, positive};
 use crate::feedback_law::{Feedback, FeedbackSample};
 use crate::hysteresis::{BoucWen, BoucWenState, Dahl, DahlState, Operator};
+use crate::number::Real;
 use crate::unfused::Unfused;
 
 /// Most pieces of a way that is too long for one.
@@ -35,6 +37,12 @@ pub trait Observable: Copy {
 
     /// That operator.
     fn running(&self) -> Self::Running;
+
+    /// The longest way, m or V, along which one branch is exact.
+    fn longest(&self) -> f64;
+
+    /// Smallest and largest slope of the output, V/m or V/V, for displacements up to `stroke`, m.
+    fn slopes(&self, stroke: f64) -> [f64; 2];
 }
 
 impl Observable for Dahl<f64> {
@@ -42,6 +50,17 @@ impl Observable for Dahl<f64> {
 
     fn running(&self) -> Dahl<Unfused> {
         Dahl { a1: Unfused(self.a1), a2: Unfused(self.a2), gain: Unfused(self.gain) }
+    }
+
+    /// A tenth of a radian: the series leaves out less than 1e-9 of the change.
+    fn longest(&self) -> f64 {
+        0.1 / libm::sqrt(self.a2).max(self.a1)
+    }
+
+    /// 0 at the origin; on the virgin branch it rises to b1 up x, at most to that of a2.
+    fn slopes(&self, stroke: f64) -> [f64; 2] {
+        let most = self.gain * stroke.min(1.0 / libm::sqrt(self.a2));
+        [most.min(0.0), most.max(0.0)]
     }
 }
 
@@ -52,80 +71,62 @@ impl Observable for BoucWen<f64> {
         let Self { rise, beta, gamma, exponent } = *self;
         BoucWen { rise: Unfused(rise), beta: Unfused(beta), gamma: Unfused(gamma), exponent }
     }
-}
-
-/// A hysteresis operator with its output in volts whose state can be corrected.
-pub trait ObservedOperator: Operator<Unfused> {
-    /// Whether its path is the applied voltage; otherwise it is the displacement.
-    const OF_DRIVE: bool;
-
-    /// The longest way, m or V, along which one branch is exact.
-    fn longest(&self) -> f64;
-
-    /// The state with an output larger by `volts`.
-    fn corrected(&self, state: &Self::State, volts: f64) -> Self::State;
-
-    /// Smallest and largest slope of the output, V/m or V/V, for displacements up to `stroke`, m.
-    fn slopes(&self, stroke: f64) -> [f64; 2];
-
-    /// Its state from a state at a place to the next place on the path, in pieces of `longest`.
-    #[inline]
-    fn moved(&self, state: &Self::State, way: f64, longest: f64) -> Self::State {
-        let mut out = *state;
-        let direction = Unfused(if way < 0.0 { -1.0 } else { 1.0 });
-        let mut left = way.abs();
-        for _ in 0..MOST_PIECES {
-            if left <= 0.0 {
-                break;
-            }
-            let piece = left.min(longest);
-            out = self.along(&self.branch(&out, direction), direction * Unfused(piece));
-            left -= piece;
-        }
-        out
-    }
-}
-
-impl ObservedOperator for Dahl<Unfused> {
-    const OF_DRIVE: bool = false;
-
-    /// A tenth of a radian: the series leaves out less than 1e-9 of the change.
-    #[inline]
-    fn longest(&self) -> f64 {
-        0.1 / libm::sqrt(self.a2.0).max(self.a1.0)
-    }
-
-    #[inline]
-    fn corrected(&self, state: &DahlState<Unfused>, volts: f64) -> DahlState<Unfused> {
-        DahlState { force: state.force + Unfused(volts), ..*state }
-    }
-
-    /// 0 at the origin; on the virgin branch it rises to b1 up x, at most to that of a2.
-    fn slopes(&self, stroke: f64) -> [f64; 2] {
-        let most = self.gain.0 * stroke.min(1.0 / libm::sqrt(self.a2.0));
-        [most.min(0.0), most.max(0.0)]
-    }
-}
-
-impl ObservedOperator for BoucWen<Unfused> {
-    const OF_DRIVE: bool = true;
 
     fn longest(&self) -> f64 {
         f64::INFINITY
     }
 
-    #[inline]
-    fn corrected(&self, state: &BoucWenState<Unfused>, volts: f64) -> BoucWenState<Unfused> {
-        BoucWenState { value: state.value + Unfused(volts), ..*state }
-    }
-
     /// 0 at the limit; A at the origin or, if that is more, 2 A beta/(beta + gamma) after a
     /// reversal at the limit.
     fn slopes(&self, _stroke: f64) -> [f64; 2] {
-        let both = self.beta.0 + self.gamma.0;
-        let reversed = if both > 0.0 { 2.0 * self.beta.0 / both } else { 1.0 };
-        let most = self.rise.0 * reversed.max(1.0);
+        let both = self.beta + self.gamma;
+        let reversed = if both > 0.0 { 2.0 * self.beta / both } else { 1.0 };
+        let most = self.rise * reversed.max(1.0);
         [most.min(0.0), most.max(0.0)]
+    }
+}
+
+/// A hysteresis operator with its output in volts whose state can be corrected.
+pub trait ObservedOperator<T: Real = f64>: Operator<Unfused<T>> {
+    /// Whether its path is the applied voltage; otherwise it is the displacement.
+    const OF_DRIVE: bool;
+
+    /// The state with an output larger by `volts`.
+    fn corrected(&self, state: &Self::State, volts: T) -> Self::State;
+
+    /// Its state from a state at a place to the next place on the path, in pieces of `longest`.
+    #[inline]
+    fn moved(&self, state: &Self::State, way: T, longest: T) -> Self::State {
+        let mut out = *state;
+        let direction = Unfused(if way < T::ZERO { T::of(-1.0) } else { T::of(1.0) });
+        let mut left = way.abs();
+        for _ in 0..MOST_PIECES {
+            if left <= T::ZERO {
+                break;
+            }
+            let piece = left.smaller(longest);
+            out = self.along(&self.branch(&out, direction), direction * Unfused(piece));
+            left = left - piece;
+        }
+        out
+    }
+}
+
+impl<T: Real> ObservedOperator<T> for Dahl<Unfused<T>> {
+    const OF_DRIVE: bool = false;
+
+    #[inline]
+    fn corrected(&self, state: &DahlState<Unfused<T>>, volts: T) -> DahlState<Unfused<T>> {
+        DahlState { force: state.force + Unfused(volts), ..*state }
+    }
+}
+
+impl<T: Real> ObservedOperator<T> for BoucWen<Unfused<T>> {
+    const OF_DRIVE: bool = true;
+
+    #[inline]
+    fn corrected(&self, state: &BoucWenState<Unfused<T>>, volts: T) -> BoucWenState<Unfused<T>> {
+        BoucWenState { value: state.value + Unfused(volts), ..*state }
     }
 }
 
@@ -176,7 +177,7 @@ impl<O: Observable> HysteresisObserver<O> {
         let right = (0.0..=1.0).contains(&correction);
         check("correction", correction, "", right, "a share from 0 to 1")?;
         positive("stroke", stroke, "m")?;
-        let [_, largest] = operator.running().slopes(stroke);
+        let [_, largest] = operator.slopes(stroke);
         finite("slope of the hysteresis", largest, "")?;
         Ok(Self { operator, gain, time, correction, stroke })
     }
@@ -192,7 +193,7 @@ impl<O: Observable> HysteresisObserver<O> {
         let expected = "a linear part whose sampled inverse is finite";
         check("plant_gain", self.gain, "m/V", (1.0 / fresh).is_finite(), expected)?;
         let (operator, correction) = (self.operator.running(), self.correction);
-        let (slopes, longest) = (operator.slopes(self.stroke), operator.longest());
+        let (slopes, longest) = (self.operator.slopes(self.stroke), self.operator.longest());
         let pole = 1.0 - rest;
         Ok(HysteresisObserved { operator, longest, inner, pole, fresh, correction, slopes })
     }
@@ -201,44 +202,60 @@ impl<O: Observable> HysteresisObserver<O> {
 /// A feedback law with an observer of the hysteresis, for one sampling interval; see
 /// [`HysteresisObserver::around`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HysteresisObserved<O, F> {
+pub struct HysteresisObserved<O, F, T = f64> {
     operator: O,
     /// The longest piece of its path, m or V.
-    longest: f64,
+    longest: T,
     inner: F,
     /// p.
-    pole: f64,
+    pole: T,
     /// g (1 - p), m/V.
-    fresh: f64,
+    fresh: T,
     /// L.
-    correction: f64,
+    correction: T,
     /// Smallest and largest slope of the operator.
-    slopes: [f64; 2],
+    slopes: [T; 2],
 }
 
 /// State of a [`HysteresisObserved`] law; `O` is that of the operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HysteresisObservedState<O, S> {
+pub struct HysteresisObservedState<O, S, T = f64> {
     inner: S,
     operator: O,
     /// x^, m.
-    displacement: f64,
+    displacement: T,
     /// The operator's place on its path, m or V.
-    place: f64,
+    place: T,
     /// Whether there was a sample.
     begun: bool,
     /// Voltage to begin with, V.
-    first: Option<f64>,
+    first: Option<T>,
     /// The last output, V.
-    volts: f64,
+    volts: T,
 }
 
 crate::snapshot!(
-    [O: crate::Snapshot, S: crate::Snapshot]
-    HysteresisObservedState<O, S> { inner, operator, displacement, place, begun, first, volts }
+    [O: crate::Snapshot, S: crate::Snapshot, T: Real]
+    HysteresisObservedState<O, S, T> { inner, operator, displacement, place, begun, first, volts }
 );
 
-impl<O: ObservedOperator, F> HysteresisObserved<O, F> {
+impl<O: Cast, F: Cast> Cast for HysteresisObserved<O, F> {
+    type In<T: Real> = HysteresisObserved<O::In<T>, F::In<T>, T>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        Ok(HysteresisObserved {
+            operator: self.operator.cast()?,
+            longest: rounded("longest", self.longest, "")?,
+            inner: self.inner.cast()?,
+            pole: rounded("plant_time", self.pole, "")?,
+            fresh: rounded("plant_gain", self.fresh, "m/V")?,
+            correction: rounded("correction", self.correction, "")?,
+            slopes: all_rounded("slope of the hysteresis", &self.slopes, "")?,
+        })
+    }
+}
+
+impl<O: ObservedOperator<T>, F, T: Real> HysteresisObserved<O, F, T> {
     /// The law inside.
     #[must_use]
     pub fn inner(&self) -> &F {
@@ -253,19 +270,19 @@ impl<O: ObservedOperator, F> HysteresisObserved<O, F> {
 
     /// The longest piece of its path, m or V.
     #[must_use]
-    pub fn longest(&self) -> f64 {
+    pub fn longest(&self) -> T {
         self.longest
     }
 
     /// p, g (1 - p) in m/V, and L.
     #[must_use]
-    pub fn coefficients(&self) -> [f64; 3] {
+    pub fn coefficients(&self) -> [T; 3] {
         [self.pole, self.fresh, self.correction]
     }
 
     /// Smallest and largest slope of the operator, V/m or V/V.
     #[must_use]
-    pub fn slopes(&self) -> [f64; 2] {
+    pub fn slopes(&self) -> [T; 2] {
         self.slopes
     }
 
@@ -277,18 +294,18 @@ impl<O: ObservedOperator, F> HysteresisObserved<O, F> {
 
     /// The estimated hysteresis, V.
     #[must_use]
-    pub fn estimate<S>(&self, state: &HysteresisObservedState<O::State, S>) -> f64 {
+    pub fn estimate<S>(&self, state: &HysteresisObservedState<O::State, S, T>) -> T {
         self.output(state)
     }
 
     #[inline]
-    fn output<S>(&self, state: &HysteresisObservedState<O::State, S>) -> f64 {
+    fn output<S>(&self, state: &HysteresisObservedState<O::State, S, T>) -> T {
         self.operator.output(&state.operator).0.0
     }
 
     /// Moves the operator to a place on its path; its output there.
     #[inline]
-    fn follow<S>(&self, state: &mut HysteresisObservedState<O::State, S>, place: f64) -> f64 {
+    fn follow<S>(&self, state: &mut HysteresisObservedState<O::State, S, T>, place: T) -> T {
         let way = place - state.place;
         state.operator = self.operator.moved(&state.operator, way, self.longest);
         state.place = place;
@@ -299,9 +316,9 @@ impl<O: ObservedOperator, F> HysteresisObserved<O, F> {
     #[inline]
     fn observe<S>(
         &self,
-        state: &mut HysteresisObservedState<O::State, S>,
-        sample: &FeedbackSample,
-    ) -> f64 {
+        state: &mut HysteresisObservedState<O::State, S, T>,
+        sample: &FeedbackSample<T>,
+    ) -> T {
         let FeedbackSample { measured, applied, .. } = *sample;
         if !state.begun {
             // The way from the origin; nothing is known of what was before.
@@ -322,22 +339,24 @@ impl<O: ObservedOperator, F> HysteresisObserved<O, F> {
     }
 }
 
-impl<O: ObservedOperator + PartialEq, F: Feedback> Feedback for HysteresisObserved<O, F> {
-    type State = HysteresisObservedState<O::State, F::State>;
+impl<O: ObservedOperator<T> + PartialEq, F: Feedback<T>, T: Real> Feedback<T>
+    for HysteresisObserved<O, F, T>
+{
+    type State = HysteresisObservedState<O::State, F::State, T>;
 
     fn rest(&self) -> Self::State {
         HysteresisObservedState {
             inner: self.inner.rest(),
             operator: self.operator.rest(),
-            displacement: 0.0,
-            place: 0.0,
+            displacement: T::ZERO,
+            place: T::ZERO,
             begun: false,
             first: None,
-            volts: 0.0,
+            volts: T::ZERO,
         }
     }
 
-    fn start(&self, volts: f64) -> Self::State {
+    fn start(&self, volts: T) -> Self::State {
         HysteresisObservedState { first: Some(volts), volts, ..self.rest() }
     }
 
@@ -346,14 +365,13 @@ impl<O: ObservedOperator + PartialEq, F: Feedback> Feedback for HysteresisObserv
     }
 
     fn adopt(&self, before: &Self, state: &mut Self::State) -> bool {
-        let pairs = self.coefficients().into_iter().zip(before.coefficients());
-        let mut pairs = pairs.map(|(one, other)| one.to_bits() == other.to_bits());
-        let same = self.operator == before.operator && pairs.all(|same| same);
+        let same = self.coefficients() == before.coefficients();
+        let same = same && self.operator == before.operator;
         same && self.inner.adopt(&before.inner, &mut state.inner)
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, sample: &FeedbackSample) -> f64 {
+    fn step(&self, state: &mut Self::State, sample: &FeedbackSample<T>) -> T {
         let estimate = self.observe(state, sample);
         if let Some(first) = state.first.take() {
             // Started once the estimate is known, and as if the error had been 0 so far.

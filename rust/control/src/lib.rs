@@ -33,6 +33,36 @@
 //! ```
 //!
 //! `examples/firmware_step.rs` has a whole axis with a repetitive part.
+//!
+//! # Single precision
+//!
+//! Settings and checks are in `f64`. What is made for a sampling interval is generic over the type
+//! of a step, [`Real`], which is `f64` where nothing else is said; [`Cast::cast`] rounds its
+//! coefficients to `f32`, and no step has an operation in `f64` then:
+//!
+//! ```
+//! use piezotrack_control::{
+//!     Cast, Controller, DahlInverse, Limits, OnlineFeedforward, Pid, ReferenceSample,
+//! };
+//!
+//! let dt = 0.02;
+//! let inverse = DahlInverse::xu_li_2010().at(dt)?;
+//! let feedforward = OnlineFeedforward::new(inverse, dt, 0.0, 0.0)?.cast::<f32>()?;
+//! let pid = Pid::xu_li_2010().at(dt)?;
+//! let controller = Controller::new(Limits::new(0.0, 75.0)?, pid).cast::<f32>()?;
+//! let mut feedforward_state = feedforward.rest();
+//! let mut controller_state = controller.rest([])?;
+//!
+//! let (reference, measured): (f32, f32) = (1.0e-6, 0.9e-6);
+//! let sample = ReferenceSample::new(reference);
+//! let volts = feedforward.step(&mut feedforward_state, &sample);
+//! let command = controller.step(&mut controller_state, reference, measured, volts);
+//! assert!(command.volts > 0.0 && command.volts < 75.0);
+//! # Ok::<(), piezotrack_control::Error>(())
+//! ```
+//!
+//! In `f64` alone are [`BoucWenInverse`], [`AsymmetricPlayInverse`] and [`IterativeLearning`], which
+//! works between two periods.
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 
@@ -42,6 +72,7 @@
 struct Readme;
 
 mod back_calculation;
+pub mod cast;
 pub mod controller;
 pub mod creep;
 pub mod cubic_motion;
@@ -70,6 +101,7 @@ pub mod snapshot;
 pub mod state_space;
 pub mod unfused;
 
+pub use cast::Cast;
 pub use controller::{Command, Controller, ControllerState};
 pub use creep::{Creep, CreepState};
 pub use damping::damped::{Damped, DampedState};
@@ -96,9 +128,10 @@ pub use iterative_learning::IterativeLearning;
 pub use lead_lag::LeadLag;
 pub use limits::Limits;
 pub use measurement::{Refused, Span};
-pub use number::Number;
+pub use number::{Number, Real};
 pub use online_feedforward::{OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};
 pub use pid::{Pid, PidState, SampledPid};
+
 pub use repetitive::{
     Outcome, Recursion, Repetitive, RepetitiveState, SampledRepetitive, Smoothing,
 };

@@ -1,6 +1,8 @@
 //! Saturation limits of the amplifier.
 
+use crate::cast::{Cast, rounded};
 use crate::error::{Result, check, finite, usable};
+use crate::number::Real;
 
 /// Voltage range of the actuator, for example 0 to 75 V for the stage of Xu and Li 2010.
 ///
@@ -14,9 +16,9 @@ use crate::error::{Result, check, finite, usable};
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    low: f64,
-    high: f64,
+pub struct Limits<T = f64> {
+    low: T,
+    high: T,
 }
 
 impl Limits {
@@ -33,16 +35,36 @@ impl Limits {
         check("high", high, "V", low < high, "a voltage above low")?;
         Ok(Self { low, high })
     }
+}
 
+/// The limits nearest to these, as those of a converter on the board are.
+impl Cast for Limits {
+    type In<T: Real> = Limits<T>;
+
+    /// # Errors
+    /// Names `low` or `high` where the real type cannot hold it, and `high` where it is not above
+    /// `low` in that type.
+    fn cast<T: Real>(&self) -> Result<Limits<T>> {
+        let (low, high): (T, T) =
+            (rounded("low", self.low, "V")?, rounded("high", self.high, "V")?);
+        for (name, value, volts) in [("low", self.low, low), ("high", self.high, high)] {
+            check(name, value, "V", volts.is_usable(), "a voltage that the real type can add up")?;
+        }
+        check("high", self.high, "V", low < high, "a voltage above low in the real type")?;
+        Ok(Limits { low, high })
+    }
+}
+
+impl<T: Real> Limits<T> {
     /// The lowest voltage, V.
     #[must_use]
-    pub fn low(&self) -> f64 {
+    pub fn low(&self) -> T {
         self.low
     }
 
     /// The highest voltage, V.
     #[must_use]
-    pub fn high(&self) -> f64 {
+    pub fn high(&self) -> T {
         self.high
     }
 
@@ -51,8 +73,8 @@ impl Limits {
     /// `v = clip(u)` before equation (24) of Xu and Li 2010, doi 10.1115/1.4001712.
     #[inline]
     #[must_use]
-    pub fn clip(&self, volts: f64) -> f64 {
-        let volts = if volts.is_nan() { 0.0 } else { volts };
+    pub fn clip(&self, volts: T) -> T {
+        let volts = if volts.is_nan() { T::ZERO } else { volts };
         if volts < self.low {
             self.low
         } else if volts > self.high {

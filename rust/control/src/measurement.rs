@@ -3,7 +3,9 @@
 //! Instruments report "not a number" and overload as finite numbers too (SCPI: 9.91e37 and
 //! 9.9e37). A displacement that the stage cannot have is no measurement, and is treated as NaN.
 
+use crate::cast::{Cast, rounded};
 use crate::error::{Result, check};
+use crate::number::Real;
 
 /// Longest displacement that any range may have, m.
 pub const LONGEST: f64 = 1.0;
@@ -18,16 +20,16 @@ pub const LONGEST: f64 = 1.0;
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span {
-    low: f64,
-    high: f64,
-    max_jump: f64,
+pub struct Span<T = f64> {
+    low: T,
+    high: T,
+    max_jump: T,
 }
 
-impl Default for Span {
+impl<T: Real> Default for Span<T> {
     /// From -10 to 10 mm, further than piezo nanopositioners move, with jumps of any size.
     fn default() -> Self {
-        Self { low: -0.01, high: 0.01, max_jump: f64::INFINITY }
+        Self { low: T::of(-0.01), high: T::of(0.01), max_jump: T::INFINITY }
     }
 }
 
@@ -54,35 +56,50 @@ impl Span {
         check("max_jump", max_jump, "m", right, "a displacement above 0, in m")?;
         Ok(Self { max_jump, ..self })
     }
+}
 
+/// Ends rounded as readings are: one within the span stays within it.
+impl Cast for Span {
+    type In<T: Real> = Span<T>;
+
+    /// # Errors
+    /// Names `span` where it is so narrow that its ends are the same in the real type.
+    fn cast<T: Real>(&self) -> Result<Span<T>> {
+        let (low, high): (T, T) =
+            (rounded("span", self.low, "m")?, rounded("span", self.high, "m")?);
+        check("span", self.high, "m", low < high, "an upper end above the lower in the real type")?;
+        // A jump beyond what the type can hold is any.
+        Ok(Span { low, high, max_jump: T::of(self.max_jump) })
+    }
+}
+
+impl<T: Real> Span<T> {
     /// The lowest displacement, m.
     #[must_use]
-    pub fn low(&self) -> f64 {
+    pub fn low(&self) -> T {
         self.low
     }
 
     /// The highest displacement, m.
     #[must_use]
-    pub fn high(&self) -> f64 {
+    pub fn high(&self) -> T {
         self.high
     }
 
     /// Whether the stage can have this displacement (m); false for NaN.
     #[inline]
     #[must_use]
-    pub fn contains(&self, displacement: f64) -> bool {
+    pub fn contains(&self, displacement: T) -> bool {
         displacement >= self.low && displacement <= self.high
     }
-}
 
-impl Span {
     /// Whether a reference (m) may be meant: within the span, or outside it by its width at most;
     /// false for NaN.
     ///
     /// What is further away only saturates, and teaches a repetitive part what it forgets for ever
     /// after.
     #[inline]
-    pub(crate) fn may_ask_for(&self, reference: f64) -> bool {
+    pub(crate) fn may_ask_for(&self, reference: T) -> bool {
         let width = self.high - self.low;
         reference >= self.low - width && reference <= self.high + width
     }
@@ -103,30 +120,30 @@ crate::snapshot!(Refused { not_finite, outside, jumps });
 
 /// State of the validation: the last valid reading, and what was refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Readings {
+pub(crate) struct Readings<T = f64> {
     /// The last valid reading, m; infinite before the first.
-    last: f64,
+    last: T,
     /// Samples since then.
     since: u32,
     pub(crate) refused: Refused,
 }
 
-crate::snapshot!(Readings { last, since, refused });
+crate::snapshot!([T: Real] Readings<T> { last, since, refused });
 
-impl Readings {
+impl<T: Real> Readings<T> {
     pub(crate) const NONE: Self = Self {
-        last: f64::INFINITY,
+        last: T::INFINITY,
         since: 0,
         refused: Refused { not_finite: 0, outside: 0, jumps: 0 },
     };
 
     /// The last valid reading, m.
-    pub(crate) fn last(&self) -> Option<f64> {
+    pub(crate) fn last(&self) -> Option<T> {
         self.last.is_finite().then_some(self.last)
     }
 
     #[inline]
-    fn refuse(&mut self, reading: f64, outside: bool) {
+    fn refuse(&mut self, reading: T, outside: bool) {
         self.since = self.since.saturating_add(1);
         let count = match (reading.is_finite(), outside) {
             (false, _) => &mut self.refused.not_finite,
@@ -137,15 +154,15 @@ impl Readings {
     }
 }
 
-impl Span {
+impl<T: Real> Span<T> {
     /// Whether a reading (m) is a measurement; counts it where it is none.
     ///
     /// The allowed jump grows with the samples since the last valid reading, so that a stage that
     /// was moved meanwhile is found again.
     #[inline]
-    pub(crate) fn accepts(&self, readings: &mut Readings, reading: f64) -> bool {
+    pub(crate) fn accepts(&self, readings: &mut Readings<T>, reading: T) -> bool {
         let inside = self.contains(reading);
-        if inside && (self.max_jump == f64::INFINITY || self.is_near(readings, reading)) {
+        if inside && (self.max_jump == T::INFINITY || self.is_near(readings, reading)) {
             (readings.last, readings.since) = (reading, 0);
             return true;
         }
@@ -153,8 +170,8 @@ impl Span {
         false
     }
 
-    fn is_near(&self, readings: &Readings, reading: f64) -> bool {
-        let samples = f64::from(readings.since) + 1.0;
-        readings.last.is_infinite() || (reading - readings.last).abs() <= self.max_jump * samples
+    fn is_near(&self, readings: &Readings<T>, reading: T) -> bool {
+        let samples = T::count(readings.since) + T::of(1.0);
+        !readings.last.is_finite() || (reading - readings.last).abs() <= self.max_jump * samples
     }
 }

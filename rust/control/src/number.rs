@@ -1,6 +1,9 @@
-//! The number type of a kernel: one `f64`, or a vector of lanes.
+//! The number type of a kernel: a vector of lanes, or one real number in double or single precision.
 
+use core::fmt::Debug;
 use core::ops::{Add, Div, Mul, Neg, Sub};
+
+use crate::snapshot::Snapshot;
 
 /// A real number, or a vector of them (lanes) on which every operation acts lane by lane.
 ///
@@ -15,9 +18,16 @@ pub trait Number:
     + Div<Output = Self>
     + Neg<Output = Self>
 {
-    /// `value` in every lane.
+    /// The real type of a lane.
+    type Lane: Real;
+
+    /// A constant in every lane.
     #[must_use]
     fn like(self, value: f64) -> Self;
+
+    /// `value` in every lane.
+    #[must_use]
+    fn each(self, value: Self::Lane) -> Self;
 
     /// `self * factor + term`, rounded once.
     #[must_use]
@@ -29,7 +39,10 @@ pub trait Number:
 
     /// Calls a scalar function for every lane, for functions other than those above.
     #[must_use]
-    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self;
+    fn lanewise<const A: usize>(
+        arguments: [Self; A],
+        function: impl Fn([Self::Lane; A]) -> Self::Lane,
+    ) -> Self;
 
     /// `yes` in the lanes where `self < 0`, `no` in the others (and where `self` is NaN).
     #[must_use]
@@ -47,9 +60,93 @@ pub trait Number:
     fn smaller(self, other: Self) -> Self;
 }
 
+/// A real number in floating point: `f64` or `f32`.
+///
+/// Functions other than the operations of [`Number`] are those of libm for that type.
+pub trait Real: Number<Lane = Self> + PartialOrd + Default + Debug + Into<f64> + Snapshot {
+    /// Zero.
+    const ZERO: Self;
+    /// Infinity.
+    const INFINITY: Self;
+    /// Not a number.
+    const NAN: Self;
+    /// Distance from 1 to the next larger number.
+    const EPSILON: Self;
+    /// The smallest number above 0 with all its digits.
+    const MIN_POSITIVE: Self;
+    /// Numbers this far from 0 soon overflow, and enter no state: 1e100, 1e30 in single precision.
+    const HUGE: Self;
+
+    /// The number nearest to `value`.
+    fn of(value: f64) -> Self;
+
+    /// A count, rounded where it has more digits than the type.
+    fn count(count: u32) -> Self;
+
+    /// The magnitude.
+    #[must_use]
+    fn abs(self) -> Self;
+
+    /// Whether the sign is negative, that of zero too.
+    fn is_sign_negative(self) -> bool;
+
+    /// The natural logarithm.
+    #[must_use]
+    fn ln(self) -> Self;
+
+    /// The natural logarithm of 1 and this number.
+    #[must_use]
+    fn ln_1p(self) -> Self;
+
+    /// The exponential function.
+    #[must_use]
+    fn exp(self) -> Self;
+
+    /// The exponential function less 1.
+    #[must_use]
+    fn exp_m1(self) -> Self;
+
+    /// This number to a power.
+    #[must_use]
+    fn pow(self, exponent: Self) -> Self;
+
+    /// The hyperbolic tangent.
+    #[must_use]
+    fn tanh(self) -> Self;
+
+    /// This magnitude with the sign of `other`.
+    #[must_use]
+    fn copysign(self, other: Self) -> Self;
+
+    /// Whether it is not a number.
+    #[inline(always)]
+    fn is_nan(self) -> bool {
+        self.partial_cmp(&self).is_none()
+    }
+
+    /// False for infinity and NaN.
+    #[inline(always)]
+    fn is_finite(self) -> bool {
+        self.abs() < Self::INFINITY
+    }
+
+    /// Whether the number may enter a state: NaN, infinity and numbers that soon overflow may not.
+    #[inline(always)]
+    fn is_usable(self) -> bool {
+        self.abs() < Self::HUGE
+    }
+}
+
 impl Number for f64 {
+    type Lane = Self;
+
     #[inline(always)]
     fn like(self, value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn each(self, value: Self) -> Self {
         value
     }
 
@@ -67,7 +164,10 @@ impl Number for f64 {
     }
 
     #[inline]
-    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
+    fn lanewise<const A: usize>(
+        arguments: [Self; A],
+        function: impl Fn([Self; A]) -> Self,
+    ) -> Self {
         function(arguments)
     }
 
@@ -89,5 +189,190 @@ impl Number for f64 {
     #[inline(always)]
     fn smaller(self, other: Self) -> Self {
         if other < self { other } else { self }
+    }
+}
+
+impl Real for f64 {
+    const ZERO: Self = 0.0;
+    const INFINITY: Self = Self::INFINITY;
+    const NAN: Self = Self::NAN;
+    const EPSILON: Self = Self::EPSILON;
+    const MIN_POSITIVE: Self = Self::MIN_POSITIVE;
+    const HUGE: Self = 1e100;
+
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn count(count: u32) -> Self {
+        Self::from(count)
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
+    }
+
+    #[inline(always)]
+    fn is_sign_negative(self) -> bool {
+        self.is_sign_negative()
+    }
+
+    #[inline]
+    fn ln(self) -> Self {
+        libm::log(self)
+    }
+
+    #[inline]
+    fn ln_1p(self) -> Self {
+        libm::log1p(self)
+    }
+
+    #[inline]
+    fn exp(self) -> Self {
+        libm::exp(self)
+    }
+
+    #[inline]
+    fn exp_m1(self) -> Self {
+        libm::expm1(self)
+    }
+
+    #[inline]
+    fn pow(self, exponent: Self) -> Self {
+        libm::pow(self, exponent)
+    }
+
+    #[inline]
+    fn tanh(self) -> Self {
+        libm::tanh(self)
+    }
+
+    #[inline]
+    fn copysign(self, other: Self) -> Self {
+        libm::copysign(self, other)
+    }
+}
+
+impl Number for f32 {
+    type Lane = Self;
+
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        Real::of(value)
+    }
+
+    #[inline(always)]
+    fn each(self, value: Self) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, term: Self) -> Self {
+        #[cfg(feature = "std")]
+        return f32::mul_add(self, factor, term);
+        #[cfg(not(feature = "std"))]
+        return libm::fmaf(self, factor, term);
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        libm::sqrtf(self)
+    }
+
+    #[inline]
+    fn lanewise<const A: usize>(
+        arguments: [Self; A],
+        function: impl Fn([Self; A]) -> Self,
+    ) -> Self {
+        function(arguments)
+    }
+
+    #[inline(always)]
+    fn where_negative(self, yes: Self, no: Self) -> Self {
+        if self < 0.0 { yes } else { no }
+    }
+
+    #[inline(always)]
+    fn any_negative(self) -> bool {
+        self < 0.0
+    }
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        if self < other { other } else { self }
+    }
+
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        if other < self { other } else { self }
+    }
+}
+
+impl Real for f32 {
+    const ZERO: Self = 0.0;
+    const INFINITY: Self = Self::INFINITY;
+    const NAN: Self = Self::NAN;
+    const EPSILON: Self = Self::EPSILON;
+    const MIN_POSITIVE: Self = Self::MIN_POSITIVE;
+    const HUGE: Self = 1e30;
+
+    #[expect(clippy::cast_possible_truncation, reason = "rounded to the nearest")]
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value as Self
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "rounded to the nearest")]
+    #[inline(always)]
+    fn count(count: u32) -> Self {
+        count as Self
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.abs()
+    }
+
+    #[inline(always)]
+    fn is_sign_negative(self) -> bool {
+        self.is_sign_negative()
+    }
+
+    #[inline]
+    fn ln(self) -> Self {
+        libm::logf(self)
+    }
+
+    #[inline]
+    fn ln_1p(self) -> Self {
+        libm::log1pf(self)
+    }
+
+    #[inline]
+    fn exp(self) -> Self {
+        libm::expf(self)
+    }
+
+    #[inline]
+    fn exp_m1(self) -> Self {
+        libm::expm1f(self)
+    }
+
+    #[inline]
+    fn pow(self, exponent: Self) -> Self {
+        libm::powf(self, exponent)
+    }
+
+    #[inline]
+    fn tanh(self) -> Self {
+        libm::tanhf(self)
+    }
+
+    #[inline]
+    fn copysign(self, other: Self) -> Self {
+        libm::copysignf(self, other)
     }
 }

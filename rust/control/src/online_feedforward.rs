@@ -18,9 +18,11 @@
 //! the time L. The inverse is that of Xu and Li 2010, equation (21), doi 10.1115/1.4001712, or of
 //! another model; see [`Inverse`].
 
+use crate::cast::{Cast, rounded};
 use crate::error::{Result, finite, not_negative, positive};
 use crate::inverse::{Inverse, after_drive};
 use crate::limits::Limits;
+use crate::number::Real;
 
 /// One sample of a reference, with what is known beside its value; `None` for what is not.
 ///
@@ -31,21 +33,21 @@ use crate::limits::Limits;
 /// assert_eq!(sample.velocity, None);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReferenceSample {
+pub struct ReferenceSample<T = f64> {
     /// Displacement to be followed, m.
-    pub position: f64,
+    pub position: T,
     /// Velocity, m/s; a difference of samples is used where it is not known.
-    pub velocity: Option<f64>,
+    pub velocity: Option<T>,
     /// Acceleration, m/s^2; a difference of samples is used where it is not known.
-    pub acceleration: Option<f64>,
+    pub acceleration: Option<T>,
     /// Displacement one sample ahead, m; makes the differences central ones.
-    pub preview: Option<f64>,
+    pub preview: Option<T>,
 }
 
-impl ReferenceSample {
+impl<T> ReferenceSample<T> {
     /// A sample of which only the displacement (m) is known.
     #[must_use]
-    pub fn new(position: f64) -> Self {
+    pub fn new(position: T) -> Self {
         Self { position, velocity: None, acceleration: None, preview: None }
     }
 }
@@ -77,31 +79,32 @@ impl ReferenceSample {
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OnlineFeedforward<I> {
+pub struct OnlineFeedforward<I, T = f64> {
     inverse: I,
-    dt: f64,
-    offset: f64,
-    delay: f64,
+    dt: T,
+    offset: T,
+    delay: T,
 }
 
 /// State of an [`OnlineFeedforward`]; `S` is the state of its inverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OnlineFeedforwardState<S> {
+pub struct OnlineFeedforwardState<S, T = f64> {
     /// The last two references, the older one first, m; `None` before the first sample.
-    past: Option<[f64; 2]>,
+    past: Option<[T; 2]>,
     inverse: S,
     /// The inverse before the last sample, and what that asked of it; `None` without a last sample,
     /// or where it is not finite.
     before: S,
-    target: Option<[f64; 3]>,
+    target: Option<[T; 3]>,
     /// By how much the stage was off the reference at the last sample and at the one before it, in
     /// displacement and velocity, m and m/s; 0 where the drive was within the limits.
-    off: [f64; 2],
-    off_before: [f64; 2],
+    off: [T; 2],
+    off_before: [T; 2],
 }
 
 crate::snapshot!(
-    [S: crate::Snapshot] OnlineFeedforwardState<S> { past, inverse, before, target, off, off_before }
+    [S: crate::Snapshot, T: Real]
+    OnlineFeedforwardState<S, T> { past, inverse, before, target, off, off_before }
 );
 
 impl<I: Inverse> OnlineFeedforward<I> {
@@ -121,10 +124,25 @@ impl<I: Inverse> OnlineFeedforward<I> {
             delay: not_negative("delay", delay, "s")?,
         })
     }
+}
 
+impl<I: Cast> Cast for OnlineFeedforward<I> {
+    type In<T: Real> = OnlineFeedforward<I::In<T>, T>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        Ok(OnlineFeedforward {
+            inverse: self.inverse.cast()?,
+            dt: rounded("dt", self.dt, "s")?,
+            offset: rounded("offset", self.offset, "m")?,
+            delay: rounded("delay", self.delay, "s")?,
+        })
+    }
+}
+
+impl<I: Inverse<T>, T: Real> OnlineFeedforward<I, T> {
     /// The sampling interval, s.
     #[must_use]
-    pub fn dt(&self) -> f64 {
+    pub fn dt(&self) -> T {
         self.dt
     }
 
@@ -136,21 +154,21 @@ impl<I: Inverse> OnlineFeedforward<I> {
 
     /// The state before the first sample, for a stage at rest that never moved.
     #[must_use]
-    pub fn rest(&self) -> OnlineFeedforwardState<I::State> {
+    pub fn rest(&self) -> OnlineFeedforwardState<I::State, T> {
         self.start(self.inverse.rest())
     }
 
     /// The state before the first sample, with that of the inverse given: for a stage that has
     /// moved before.
     #[must_use]
-    pub fn start(&self, inverse: I::State) -> OnlineFeedforwardState<I::State> {
+    pub fn start(&self, inverse: I::State) -> OnlineFeedforwardState<I::State, T> {
         OnlineFeedforwardState {
             past: None,
             inverse,
             before: inverse,
             target: None,
-            off: [0.0; 2],
-            off_before: [0.0; 2],
+            off: [T::ZERO; 2],
+            off_before: [T::ZERO; 2],
         }
     }
 
@@ -164,23 +182,24 @@ impl<I: Inverse> OnlineFeedforward<I> {
     #[inline]
     pub fn step(
         &self,
-        state: &mut OnlineFeedforwardState<I::State>,
-        sample: &ReferenceSample,
-    ) -> f64 {
+        state: &mut OnlineFeedforwardState<I::State, T>,
+        sample: &ReferenceSample<T>,
+    ) -> T {
         let (reference, dt) = (sample.position, self.dt);
+        let (half, two) = (T::of(0.5), T::of(2.0));
         let [first, before] = state.past.unwrap_or([reference; 2]);
         let (velocity, acceleration) = match sample.preview {
             Some(preview) => {
-                (0.5 * (preview - before) / dt, (preview - 2.0 * reference + before) / (dt * dt))
+                (half * (preview - before) / dt, (preview - two * reference + before) / (dt * dt))
             }
-            None => ((reference - before) / dt, (reference - 2.0 * before + first) / (dt * dt)),
+            None => ((reference - before) / dt, (reference - two * before + first) / (dt * dt)),
         };
         let v = sample.velocity.unwrap_or(velocity);
         let a = sample.acceleration.unwrap_or(acceleration);
         let lead = self.delay;
-        let x = reference + lead * (v + 0.5 * lead * a) - self.offset;
+        let x = reference + lead * (v + half * lead * a) - self.offset;
         state.before = state.inverse;
-        (state.off_before, state.off) = (state.off, [0.0; 2]);
+        (state.off_before, state.off) = (state.off, [T::ZERO; 2]);
         let target = [x, v + lead * a, a];
         state.target = target.iter().all(|value| value.is_finite()).then_some(target);
         let [x, v, a] = target;
@@ -188,7 +207,7 @@ impl<I: Inverse> OnlineFeedforward<I> {
         if reference.is_finite() {
             state.past = Some([before, reference]);
         } else if state.past.is_some() {
-            state.past = Some([before, 2.0 * before - first]);
+            state.past = Some([before, two * before - first]);
         }
         drive
     }
@@ -198,14 +217,14 @@ impl<I: Inverse> OnlineFeedforward<I> {
     #[inline]
     pub fn step_within(
         &self,
-        state: &mut OnlineFeedforwardState<I::State>,
-        sample: &ReferenceSample,
-        limits: &Limits,
-    ) -> f64 {
+        state: &mut OnlineFeedforwardState<I::State, T>,
+        sample: &ReferenceSample<T>,
+        limits: &Limits<T>,
+    ) -> T {
         let drive = self.step(state, sample);
         let reached = limits.clip(drive);
         // Not where the drive is NaN.
-        if (drive - reached).abs() > 0.0 {
+        if (drive - reached).abs() > T::ZERO {
             self.applied(state, reached);
         }
         drive
@@ -217,7 +236,7 @@ impl<I: Inverse> OnlineFeedforward<I> {
     /// The last step is done again for the displacement at which the inverse gives this drive: the
     /// inverse is evaluated 42 times at most, some 8 times mostly. Without a last drive, and where no
     /// displacement has this one, nothing changes.
-    pub fn applied(&self, state: &mut OnlineFeedforwardState<I::State>, volts: f64) {
+    pub fn applied(&self, state: &mut OnlineFeedforwardState<I::State, T>, volts: T) {
         let Some(target) = state.target else { return };
         let (before, off) = (&state.before, state.off_before);
         if let Some(after) = after_drive(&self.inverse, before, target, off, self.dt, volts) {

@@ -11,8 +11,10 @@
 //! recursion is that of the feedback part only. The excess `eu` is the applied voltage `v` less
 //! the total command `u = uFB + uFF + uRC`.
 
+use crate::cast::{Cast, rounded};
 use crate::error::{Error, Result, check, finite, not_negative};
 use crate::feedback_law::{Feedback, FeedbackSample};
+use crate::number::Real;
 
 /// Gains of a PID controller, in continuous time.
 ///
@@ -128,49 +130,62 @@ impl Pid {
 /// Gains change without a bump: continue with the same state and other coefficients. The state
 /// is the output and two errors, and no coefficient multiplies the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SampledPid {
+pub struct SampledPid<T = f64> {
     /// Kp, V/m.
-    proportional: f64,
+    proportional: T,
     /// Kp Ts/Ti, V/m.
-    integral: f64,
+    integral: T,
     /// Kp Td/Ts, V/m.
-    derivative: f64,
+    derivative: T,
     /// Ts/Tt.
-    tracking: f64,
+    tracking: T,
 }
 
 /// State of a PID controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PidState {
+pub struct PidState<T = f64> {
     /// The output, V.
-    volts: f64,
+    volts: T,
     /// The last two errors, m. `None` before the first error, which then stands for the earlier
     /// ones too, so that the controller starts without a derivative kick. Without an integral part
     /// nothing would ever make up for what it asks for: from 0 V, that is the first output then.
-    errors: Option<[f64; 2]>,
+    errors: Option<[T; 2]>,
 }
 
-crate::snapshot!(PidState { volts, errors });
-crate::snapshot!(SampledPid { proportional, integral, derivative, tracking });
+crate::snapshot!([T: Real] PidState<T> { volts, errors });
+crate::snapshot!([T: Real] SampledPid<T> { proportional, integral, derivative, tracking });
 
-impl SampledPid {
+impl Cast for SampledPid {
+    type In<T: Real> = SampledPid<T>;
+
+    fn cast<T: Real>(&self) -> Result<SampledPid<T>> {
+        Ok(SampledPid {
+            proportional: rounded("kp", self.proportional, "V/m")?,
+            integral: rounded("ti", self.integral, "V/m")?,
+            derivative: rounded("td", self.derivative, "V/m")?,
+            tracking: rounded("tt", self.tracking, "")?,
+        })
+    }
+}
+
+impl<T: Real> SampledPid<T> {
     /// Kp, Kp Ts/Ti and Kp Td/Ts, V/m: the weights of `e[k] - e[k-1]`, `e[k]` and
     /// `e[k] - 2 e[k-1] + e[k-2]`.
     #[must_use]
-    pub fn weights(&self) -> [f64; 3] {
+    pub fn weights(&self) -> [T; 3] {
         [self.proportional, self.integral, self.derivative]
     }
 
     /// Ts/Tt: the weight of the voltage applied less the command, in the sample before.
     #[must_use]
-    pub fn tracking(&self) -> f64 {
+    pub fn tracking(&self) -> T {
         self.tracking
     }
 
     /// The controller whose coefficients are a share, 0 to 1, of the way to those of another.
     #[must_use]
-    pub fn towards(&self, other: &Self, share: f64) -> Self {
-        let between = |from: f64, to: f64| from + share * (to - from);
+    pub fn towards(&self, other: &Self, share: T) -> Self {
+        let between = |from: T, to: T| from + share * (to - from);
         Self {
             proportional: between(self.proportional, other.proportional),
             integral: between(self.integral, other.integral),
@@ -180,27 +195,27 @@ impl SampledPid {
     }
 }
 
-impl Feedback for SampledPid {
-    type State = PidState;
+impl<T: Real> Feedback<T> for SampledPid<T> {
+    type State = PidState<T>;
 
-    fn rest(&self) -> PidState {
-        self.start(0.0)
+    fn rest(&self) -> PidState<T> {
+        self.start(T::ZERO)
     }
 
-    fn start(&self, volts: f64) -> PidState {
+    fn start(&self, volts: T) -> PidState<T> {
         PidState { volts, errors: None }
     }
 
     /// Always: no coefficient multiplies the output.
-    fn adopt(&self, _before: &Self, _state: &mut PidState) -> bool {
+    fn adopt(&self, _before: &Self, _state: &mut PidState<T>) -> bool {
         true
     }
 
     #[inline]
-    fn step(&self, state: &mut PidState, sample: &FeedbackSample) -> f64 {
+    fn step(&self, state: &mut PidState<T>, sample: &FeedbackSample<T>) -> T {
         let FeedbackSample { error, excess, .. } = *sample;
         let [e1, e2] = state.errors.unwrap_or([error; 2]);
-        if state.errors.is_none() && self.integral == 0.0 && state.volts == 0.0 {
+        if state.errors.is_none() && self.integral == T::ZERO && state.volts == T::ZERO {
             state.volts = self.proportional * error;
         }
         let rise = error - e1;

@@ -7,8 +7,10 @@
 //! multiplies: the transfer is bumpless (Rugh and Shamma 2000, doi 10.1016/S0005-1098(00)00058-3,
 //! on gain scheduling).
 
+use crate::cast::{Cast, all_rounded, rounded};
 use crate::error::{Result, check, positive};
 use crate::feedback_law::{Feedback, FeedbackSample};
+use crate::number::Real;
 use crate::pid::{Pid, PidState, SampledPid};
 
 /// Most amplitudes, and most rates, of a schedule.
@@ -31,24 +33,24 @@ const TURNED: f64 = 0.02;
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ScheduledPid {
-    amplitudes: Axis,
-    rates: Axis,
+pub struct ScheduledPid<T = f64> {
+    amplitudes: Axis<T>,
+    rates: Axis<T>,
     /// For each amplitude the gains at each rate.
-    gains: [[SampledPid; MOST_GRADES]; MOST_GRADES],
+    gains: [[SampledPid<T>; MOST_GRADES]; MOST_GRADES],
     /// Those until the first half wave has ended.
-    first: SampledPid,
-    dt: f64,
+    first: SampledPid<T>,
+    dt: T,
 }
 
 /// Logarithms of the values along an axis, in rising order.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Axis {
-    logarithms: [f64; MOST_GRADES],
+struct Axis<T> {
+    logarithms: [T; MOST_GRADES],
     count: usize,
 }
 
-impl Axis {
+impl Axis<f64> {
     fn new(name: &'static str, values: &[f64], unit: &'static str) -> Result<Self> {
         let count = values.len();
         let room = u32::try_from(count).map_or(f64::INFINITY, f64::from);
@@ -64,9 +66,16 @@ impl Axis {
         Ok(Self { logarithms, count })
     }
 
+    fn cast<T: Real>(&self) -> Result<Axis<T>> {
+        let logarithms = all_rounded("gains", &self.logarithms, "")?;
+        Ok(Axis { logarithms, count: self.count })
+    }
+}
+
+impl<T: Real> Axis<T> {
     /// The entry below a value, and how far the value is towards the next.
-    fn place(&self, value: f64) -> (usize, f64) {
-        let logarithm = libm::log(value);
+    fn place(&self, value: T) -> (usize, T) {
+        let logarithm = value.ln();
         let mut below = 0;
         for i in 1..self.count.saturating_sub(1) {
             if logarithm > self.logarithms[i] {
@@ -74,11 +83,11 @@ impl Axis {
             }
         }
         if self.count < 2 {
-            return (0, 0.0);
+            return (0, T::ZERO);
         }
         let (low, high) = (self.logarithms[below], self.logarithms[below + 1]);
         let share = (logarithm - low) / (high - low);
-        (below, if share > 0.0 { share.min(1.0) } else { 0.0 })
+        (below, if share > T::ZERO { share.smaller(T::of(1.0)) } else { T::ZERO })
     }
 }
 
@@ -114,10 +123,28 @@ impl ScheduledPid {
         out.first = out.at(first.0, first.1);
         Ok(out)
     }
+}
 
+impl Cast for ScheduledPid {
+    type In<T: Real> = ScheduledPid<T>;
+
+    fn cast<T: Real>(&self) -> Result<ScheduledPid<T>> {
+        let first = self.first.cast()?;
+        let mut gains = [[first; MOST_GRADES]; MOST_GRADES];
+        for (row, own) in gains.iter_mut().zip(&self.gains) {
+            for (slot, own) in row.iter_mut().zip(own) {
+                *slot = own.cast()?;
+            }
+        }
+        let (amplitudes, rates) = (self.amplitudes.cast()?, self.rates.cast()?);
+        Ok(ScheduledPid { amplitudes, rates, gains, first, dt: rounded("dt", self.dt, "s")? })
+    }
+}
+
+impl<T: Real> ScheduledPid<T> {
     /// The gains at an amplitude (m) and a rate (Hz); at the nearest end of the grid outside of it.
     #[must_use]
-    pub fn at(&self, amplitude: f64, rate: f64) -> SampledPid {
+    pub fn at(&self, amplitude: T, rate: T) -> SampledPid<T> {
         let (i, along) = self.amplitudes.place(amplitude);
         let (j, across) = self.rates.place(rate);
         let (next, beside) = ((i + 1).min(MOST_GRADES - 1), (j + 1).min(MOST_GRADES - 1));
@@ -128,19 +155,19 @@ impl ScheduledPid {
 
     /// The gains until the first half wave has ended.
     #[must_use]
-    pub fn first(&self) -> SampledPid {
+    pub fn first(&self) -> SampledPid<T> {
         self.first
     }
 }
 
 /// State of a [`ScheduledPid`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ScheduledPidState {
-    pid: PidState,
-    gains: SampledPid,
+pub struct ScheduledPidState<T = f64> {
+    pid: PidState<T>,
+    gains: SampledPid<T>,
     /// Last turning point and the furthest reference since, m.
-    turn: f64,
-    furthest: f64,
+    turn: T,
+    furthest: T,
     /// Samples from one to the other, and since then.
     half_wave: u32,
     since: u32,
@@ -149,54 +176,57 @@ pub struct ScheduledPidState {
     begun: bool,
 }
 
-crate::snapshot!(ScheduledPidState { pid, gains, turn, furthest, half_wave, since, turns, begun });
+crate::snapshot!(
+    [T: Real]
+    ScheduledPidState<T> { pid, gains, turn, furthest, half_wave, since, turns, begun }
+);
 
-impl ScheduledPidState {
-    fn new(pid: PidState, gains: SampledPid) -> Self {
-        let (turn, furthest) = (0.0, 0.0);
+impl<T: Real> ScheduledPidState<T> {
+    fn new(pid: PidState<T>, gains: SampledPid<T>) -> Self {
+        let (turn, furthest) = (T::ZERO, T::ZERO);
         Self { pid, gains, turn, furthest, half_wave: 0, since: 0, turns: 0, begun: false }
     }
 
     /// Follows the reference; true where it has turned.
     #[inline]
-    fn turned(&mut self, reference: f64) -> bool {
+    fn turned(&mut self, reference: T) -> bool {
         if !self.begun {
             (self.turn, self.furthest, self.begun) = (reference, reference, true);
         }
         self.since = self.since.saturating_add(1);
         let swing = self.furthest - self.turn;
-        if (reference - self.furthest) * swing >= 0.0 {
+        if (reference - self.furthest) * swing >= T::ZERO {
             self.half_wave = self.half_wave.saturating_add(self.since);
             (self.furthest, self.since) = (reference, 0);
             return false;
         }
-        (self.furthest - reference).abs() > TURNED * swing.abs()
+        (self.furthest - reference).abs() > T::of(TURNED) * swing.abs()
     }
 }
 
-impl Feedback for ScheduledPid {
-    type State = ScheduledPidState;
+impl<T: Real> Feedback<T> for ScheduledPid<T> {
+    type State = ScheduledPidState<T>;
 
-    fn rest(&self) -> ScheduledPidState {
+    fn rest(&self) -> ScheduledPidState<T> {
         ScheduledPidState::new(self.first.rest(), self.first)
     }
 
-    fn start(&self, volts: f64) -> ScheduledPidState {
+    fn start(&self, volts: T) -> ScheduledPidState<T> {
         ScheduledPidState::new(self.first.start(volts), self.first)
     }
 
     /// Always: the gains are those of the new schedule from the next turning point on.
-    fn adopt(&self, _before: &Self, _state: &mut ScheduledPidState) -> bool {
+    fn adopt(&self, _before: &Self, _state: &mut ScheduledPidState<T>) -> bool {
         true
     }
 
     #[inline]
-    fn step(&self, state: &mut ScheduledPidState, sample: &FeedbackSample) -> f64 {
+    fn step(&self, state: &mut ScheduledPidState<T>, sample: &FeedbackSample<T>) -> T {
         if state.turned(sample.reference) {
             // The first half wave is cut off where the motion begins.
             if state.turns > 0 && state.half_wave > 0 {
-                let amplitude = 0.5 * (state.furthest - state.turn).abs();
-                let rate = 0.5 / (f64::from(state.half_wave) * self.dt);
+                let amplitude = T::of(0.5) * (state.furthest - state.turn).abs();
+                let rate = T::of(0.5) / (T::count(state.half_wave) * self.dt);
                 state.gains = self.at(amplitude, rate);
             }
             state.turns = state.turns.saturating_add(1);

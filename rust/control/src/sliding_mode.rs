@@ -9,8 +9,10 @@
 //! V/m inside the boundary layer; there the law is linear, a PID with filtered derivative. The
 //! feedforward is the equivalent control: eta bounds what it leaves to the feedback.
 
+use crate::cast::{Cast, rounded};
 use crate::error::{Result, check, not_negative, positive};
 use crate::feedback_law::{Feedback, FeedbackSample};
+use crate::number::Real;
 
 /// Sliding mode control in continuous time.
 ///
@@ -78,81 +80,96 @@ impl SlidingMode {
 
 /// Coefficients of sliding mode control for one sampling interval; see [`SlidingMode::at`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SampledSlidingMode {
+pub struct SampledSlidingMode<T = f64> {
     /// eta, V.
-    switching: f64,
+    switching: T,
     /// eta/phi, V/m.
-    gain: f64,
+    gain: T,
     /// Ts/Ti.
-    integral: f64,
+    integral: T,
     /// Td/Ts.
-    derivative: f64,
+    derivative: T,
     /// Share of a new difference that enters the filtered one.
-    fresh: f64,
+    fresh: T,
 }
 
 /// State of sliding mode control.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SlidingModeState {
+pub struct SlidingModeState<T = f64> {
     /// Integral part of the surface, m.
-    integral: f64,
+    integral: T,
     /// Filtered change of the error in a sample, m.
-    change: f64,
+    change: T,
     /// The last error, m; `None` before the first.
-    error: Option<f64>,
+    error: Option<T>,
     /// Voltage to begin with, V, and then the part of it beyond the switching gain.
-    base: f64,
+    base: T,
     /// The last output, V.
-    volts: f64,
+    volts: T,
 }
 
-crate::snapshot!(SlidingModeState { integral, change, error, base, volts });
+crate::snapshot!([T: Real] SlidingModeState<T> { integral, change, error, base, volts });
 
-impl SampledSlidingMode {
+impl Cast for SampledSlidingMode {
+    type In<T: Real> = SampledSlidingMode<T>;
+
+    fn cast<T: Real>(&self) -> Result<SampledSlidingMode<T>> {
+        Ok(SampledSlidingMode {
+            switching: rounded("switching", self.switching, "V")?,
+            gain: rounded("layer", self.gain, "V/m")?,
+            integral: rounded("ti", self.integral, "")?,
+            derivative: rounded("td", self.derivative, "")?,
+            fresh: rounded("tf", self.fresh, "")?,
+        })
+    }
+}
+
+impl<T: Real> SampledSlidingMode<T> {
     /// eta/phi in V/m, Ts/Ti, Td/Ts and the share of a new difference in the filtered one: the law
     /// inside its boundary layer.
     #[must_use]
-    pub fn inside(&self) -> [f64; 4] {
+    pub fn inside(&self) -> [T; 4] {
         [self.gain, self.integral, self.derivative, self.fresh]
     }
 
     /// eta, V: the largest output.
     #[must_use]
-    pub fn switching(&self) -> f64 {
+    pub fn switching(&self) -> T {
         self.switching
     }
 
     /// The first output is the voltage to begin with: as much of it as can be is integral.
     #[inline]
-    fn begin(&self, state: &mut SlidingModeState, error: f64) {
-        let bounded = |volts: f64| volts.max(-self.switching).min(self.switching);
-        if self.integral > 0.0 {
-            state.integral = bounded(state.base) / self.gain - error * (1.0 + self.integral);
-            state.base -= bounded(state.base);
+    fn begin(&self, state: &mut SlidingModeState<T>, error: T) {
+        let bounded = |volts: T| volts.larger(-self.switching).smaller(self.switching);
+        if self.integral > T::ZERO {
+            state.integral = bounded(state.base) / self.gain - error * (T::of(1.0) + self.integral);
+            state.base = state.base - bounded(state.base);
         } else {
-            state.base -= bounded(self.gain * error);
+            state.base = state.base - bounded(self.gain * error);
         }
     }
 }
 
-impl Feedback for SampledSlidingMode {
-    type State = SlidingModeState;
+impl<T: Real> Feedback<T> for SampledSlidingMode<T> {
+    type State = SlidingModeState<T>;
 
-    fn rest(&self) -> SlidingModeState {
-        SlidingModeState { integral: 0.0, change: 0.0, error: None, base: 0.0, volts: 0.0 }
+    fn rest(&self) -> SlidingModeState<T> {
+        let zero = T::ZERO;
+        SlidingModeState { integral: zero, change: zero, error: None, base: zero, volts: zero }
     }
 
-    fn start(&self, volts: f64) -> SlidingModeState {
+    fn start(&self, volts: T) -> SlidingModeState<T> {
         // The sign of zero says that there is a voltage to begin with.
-        SlidingModeState { base: volts, volts, change: -0.0, ..self.rest() }
+        SlidingModeState { base: volts, volts, change: -T::ZERO, ..self.rest() }
     }
 
-    fn adopt(&self, before: &Self, _state: &mut SlidingModeState) -> bool {
+    fn adopt(&self, before: &Self, _state: &mut SlidingModeState<T>) -> bool {
         self == before
     }
 
     #[inline]
-    fn step(&self, state: &mut SlidingModeState, sample: &FeedbackSample) -> f64 {
+    fn step(&self, state: &mut SlidingModeState<T>, sample: &FeedbackSample<T>) -> T {
         let FeedbackSample { error, excess, .. } = *sample;
         let old = state.error.unwrap_or(error);
         if state.error.is_none() && state.change.is_sign_negative() {
@@ -163,13 +180,13 @@ impl Feedback for SampledSlidingMode {
         let integral = state.integral + step;
         let surface = error + self.derivative * change + integral;
         if !surface.is_finite() {
-            *state = SlidingModeState { error: None, change: 0.0, ..*state };
+            *state = SlidingModeState { error: None, change: T::ZERO, ..*state };
             return state.volts;
         }
         let asked = self.gain * surface;
-        let volts = asked.max(-self.switching).min(self.switching);
+        let volts = asked.larger(-self.switching).smaller(self.switching);
         // Beyond the layer or the limits, the integral does not go further out.
-        let outward = (volts - asked) * step < 0.0 || excess * step < 0.0;
+        let outward = (volts - asked) * step < T::ZERO || excess * step < T::ZERO;
         let integral = if outward { state.integral } else { integral };
         let volts = volts + state.base;
         *state = SlidingModeState { integral, change, error: Some(error), base: state.base, volts };

@@ -22,8 +22,6 @@
 //! # Ok::<(), piezotrack_control::Error>(())
 //! ```
 
-use crate::unfused::Unfused;
-
 /// A state that can be written as numbers and read back.
 pub trait Snapshot {
     /// Passes the numbers to `write`, one after the other.
@@ -66,13 +64,19 @@ impl Snapshot for f64 {
     }
 }
 
-impl Snapshot for Unfused {
+/// Written as the same number in `f64`; one that is none of an `f32` is not read.
+impl Snapshot for f32 {
     fn save(&self, write: &mut dyn FnMut(f64)) {
-        write(self.0);
+        write(f64::from(*self));
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "checked")]
     fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
-        self.0.load(read)
+        let number = read()?;
+        let cast = number as Self;
+        let same = f64::from(cast).to_bits() == number.to_bits() || number.is_nan();
+        *self = same.then_some(cast)?;
+        Some(())
     }
 }
 

@@ -5,8 +5,10 @@
 //! ```
 
 use crate::back_calculation::gain;
+use crate::cast::{Cast, all_rounded, rounded};
 use crate::error::{Error, Result, check, finite};
 use crate::feedback_law::{Feedback, FeedbackSample};
+use crate::number::Real;
 
 /// A linear controller with up to `N` states: tracking error (m) in, voltage (V) out.
 ///
@@ -29,12 +31,12 @@ use crate::feedback_law::{Feedback, FeedbackSample};
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StateSpace<const N: usize> {
-    a: [[f64; N]; N],
-    b: [f64; N],
-    c: [f64; N],
-    d: f64,
-    back: Option<[f64; N]>,
+pub struct StateSpace<const N: usize, T = f64> {
+    a: [[T; N]; N],
+    b: [T; N],
+    c: [T; N],
+    d: T,
+    back: Option<[T; N]>,
     /// States that are used: the others stay 0.
     used: usize,
 }
@@ -77,10 +79,29 @@ impl<const N: usize> StateSpace<N> {
     }
 }
 
-impl<const N: usize> StateSpace<N> {
+impl<const N: usize> Cast for StateSpace<N> {
+    type In<T: Real> = StateSpace<N, T>;
+
+    fn cast<T: Real>(&self) -> Result<StateSpace<N, T>> {
+        let mut a = [[T::ZERO; N]; N];
+        for (row, own) in a.iter_mut().zip(&self.a) {
+            *row = all_rounded("a", own, "")?;
+        }
+        Ok(StateSpace {
+            a,
+            b: all_rounded("b", &self.b, "")?,
+            c: all_rounded("c", &self.c, "")?,
+            d: rounded("d", self.d, "V/m")?,
+            back: self.back.as_ref().map(|back| all_rounded("back", back, "")).transpose()?,
+            used: self.used,
+        })
+    }
+}
+
+impl<const N: usize, T: Real> StateSpace<N, T> {
     /// A (row by row), B, C and D, padded with zeros where there are fewer than `N` states.
     #[must_use]
-    pub fn matrices(&self) -> (&[[f64; N]; N], &[f64; N], &[f64; N], f64) {
+    pub fn matrices(&self) -> (&[[T; N]; N], &[T; N], &[T; N], T) {
         (&self.a, &self.b, &self.c, self.d)
     }
 
@@ -92,7 +113,7 @@ impl<const N: usize> StateSpace<N> {
 
     /// The gain `l` of back-calculation; `None` where the state is held under saturation instead.
     #[must_use]
-    pub fn antiwindup(&self) -> Option<&[f64; N]> {
+    pub fn antiwindup(&self) -> Option<&[T; N]> {
         self.back.as_ref()
     }
 }
@@ -121,26 +142,26 @@ fn fill(to: &mut [f64], from: &[f64]) {
 
 /// State of a [`StateSpace`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StateSpaceState<const N: usize> {
-    x: [f64; N],
+pub struct StateSpaceState<const N: usize, T = f64> {
+    x: [T; N],
     /// The error of the last sample, not yet applied to `x`; `None` before the first sample.
-    error: Option<f64>,
+    error: Option<T>,
     /// Voltage at the first sample for a bumpless start, V.
-    first: Option<f64>,
+    first: Option<T>,
     /// Constant output for the bumpless start, V. It stays; an integrator compensates it.
-    offset: f64,
+    offset: T,
 }
 
-crate::snapshot!([const N: usize] StateSpaceState<N> { x, error, first, offset });
+crate::snapshot!([const N: usize, T: Real] StateSpaceState<N, T> { x, error, first, offset });
 
-impl<const N: usize> Feedback for StateSpace<N> {
-    type State = StateSpaceState<N>;
+impl<const N: usize, T: Real> Feedback<T> for StateSpace<N, T> {
+    type State = StateSpaceState<N, T>;
 
     fn rest(&self) -> Self::State {
-        StateSpaceState { x: [0.0; N], error: None, first: None, offset: 0.0 }
+        StateSpaceState { x: [T::ZERO; N], error: None, first: None, offset: T::ZERO }
     }
 
-    fn start(&self, volts: f64) -> Self::State {
+    fn start(&self, volts: T) -> Self::State {
         StateSpaceState { first: Some(volts), ..self.rest() }
     }
 
@@ -149,7 +170,7 @@ impl<const N: usize> Feedback for StateSpace<N> {
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, sample: &FeedbackSample) -> f64 {
+    fn step(&self, state: &mut Self::State, sample: &FeedbackSample<T>) -> T {
         let FeedbackSample { error, excess, .. } = *sample;
         if let Some(last) = state.error {
             self.advance(&mut state.x, last, excess);
@@ -163,30 +184,30 @@ impl<const N: usize> Feedback for StateSpace<N> {
         }
         // Overflow: start again.
         *state = self.rest();
-        0.0
+        T::ZERO
     }
 }
 
-impl<const N: usize> StateSpace<N> {
+impl<const N: usize, T: Real> StateSpace<N, T> {
     /// Advances the state by the last sample, whose error and excess are known now.
     #[inline]
-    fn advance(&self, x: &mut [f64; N], error: f64, excess: f64) {
-        let mut next = [0.0; N];
+    fn advance(&self, x: &mut [T; N], error: T, excess: T) {
+        let mut next = [T::ZERO; N];
         for ((next, row), b) in next.iter_mut().zip(&self.a).zip(&self.b).take(self.used) {
-            *next = self.dot(row, x) + b * error;
+            *next = self.dot(row, x) + *b * error;
         }
         if let Some(back) = &self.back {
             for (next, gain) in next.iter_mut().zip(back).take(self.used) {
-                *next += gain * excess;
+                *next = *next + *gain * excess;
             }
-        } else if excess * (self.dot(&self.c, &next) - self.dot(&self.c, x)) < 0.0 {
+        } else if excess * (self.dot(&self.c, &next) - self.dot(&self.c, x)) < T::ZERO {
             return;
         }
         *x = next;
     }
 
     #[inline]
-    fn dot(&self, a: &[f64; N], b: &[f64; N]) -> f64 {
-        a.iter().zip(b).take(self.used).fold(0.0, |sum, (a, b)| sum + a * b)
+    fn dot(&self, a: &[T; N], b: &[T; N]) -> T {
+        a.iter().zip(b).take(self.used).fold(T::ZERO, |sum, (a, b)| sum + *a * *b)
     }
 }

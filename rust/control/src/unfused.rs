@@ -2,15 +2,18 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::Number;
+use crate::cast::{Cast, rounded};
+use crate::error::Result;
+use crate::number::{Number, Real};
+use crate::snapshot::Snapshot;
 
 /// A number whose `mul_add` is a multiplication and an addition, each rounded. On a target
-/// without a fused instruction `f64::mul_add` is a call of a slow library function, and those of
+/// without a fused instruction for this type, or without a way to it where there is no `std`, `mul_add` is a call of a slow library function, and those of
 /// one step would take longer than the rest of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unfused(pub f64);
+pub struct Unfused<T = f64>(pub T);
 
-impl Add for Unfused {
+impl<T: Real> Add for Unfused<T> {
     type Output = Self;
 
     #[inline(always)]
@@ -19,7 +22,7 @@ impl Add for Unfused {
     }
 }
 
-impl Sub for Unfused {
+impl<T: Real> Sub for Unfused<T> {
     type Output = Self;
 
     #[inline(always)]
@@ -28,7 +31,7 @@ impl Sub for Unfused {
     }
 }
 
-impl Mul for Unfused {
+impl<T: Real> Mul for Unfused<T> {
     type Output = Self;
 
     #[inline(always)]
@@ -37,7 +40,7 @@ impl Mul for Unfused {
     }
 }
 
-impl Div for Unfused {
+impl<T: Real> Div for Unfused<T> {
     type Output = Self;
 
     #[inline(always)]
@@ -46,7 +49,7 @@ impl Div for Unfused {
     }
 }
 
-impl Neg for Unfused {
+impl<T: Real> Neg for Unfused<T> {
     type Output = Self;
 
     #[inline(always)]
@@ -55,9 +58,16 @@ impl Neg for Unfused {
     }
 }
 
-impl Number for Unfused {
+impl<T: Real> Number for Unfused<T> {
+    type Lane = T;
+
     #[inline(always)]
     fn like(self, value: f64) -> Self {
+        Self(T::of(value))
+    }
+
+    #[inline(always)]
+    fn each(self, value: T) -> Self {
         Self(value)
     }
 
@@ -68,22 +78,22 @@ impl Number for Unfused {
 
     #[inline(always)]
     fn sqrt(self) -> Self {
-        Self(libm::sqrt(self.0))
+        Self(self.0.sqrt())
     }
 
     #[inline]
-    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([f64; A]) -> f64) -> Self {
+    fn lanewise<const A: usize>(arguments: [Self; A], function: impl Fn([T; A]) -> T) -> Self {
         Self(function(arguments.map(|argument| argument.0)))
     }
 
     #[inline(always)]
     fn where_negative(self, yes: Self, no: Self) -> Self {
-        if self.0 < 0.0 { yes } else { no }
+        if self.0 < T::ZERO { yes } else { no }
     }
 
     #[inline(always)]
     fn any_negative(self) -> bool {
-        self.0 < 0.0
+        self.0 < T::ZERO
     }
 
     #[inline(always)]
@@ -94,5 +104,23 @@ impl Number for Unfused {
     #[inline(always)]
     fn smaller(self, other: Self) -> Self {
         Self(self.0.smaller(other.0))
+    }
+}
+
+impl<T: Real> Snapshot for Unfused<T> {
+    fn save(&self, write: &mut dyn FnMut(f64)) {
+        self.0.save(write);
+    }
+
+    fn load(&mut self, read: &mut dyn FnMut() -> Option<f64>) -> Option<()> {
+        self.0.load(read)
+    }
+}
+
+impl Cast for Unfused {
+    type In<T: Real> = Unfused<T>;
+
+    fn cast<T: Real>(&self) -> Result<Unfused<T>> {
+        rounded("parameter", self.0, "").map(Unfused)
     }
 }

@@ -128,28 +128,56 @@ def test_a_step_on_a_board_has_the_bits_and_the_instructions_that_are_stated(
 
 RUST = """
 #include <stdint.h>
-typedef double real;
+typedef REAL real;
 typedef struct { uint32_t nothing; } inner_state;
-int axis_begin(void);
-double axis_volts(double reference, double measured, double feedforward);
-void axis_gave(double volts);
-void axis_forget(void);
-#define inner_init(loop) ((void)(loop), (void)axis_begin())
-#define inner_step(loop, reference, next, reading, volts) axis_volts(reference, reading, volts)
-#define inner_applied(loop, volts) (axis_gave(volts), 1)
-#define inner_reset(loop) axis_forget()
+int PREFIX_begin(void);
+real PREFIX_volts(real reference, real measured, real feedforward);
+void PREFIX_gave(real volts);
+void PREFIX_forget(void);
+#define inner_init(loop) ((void)(loop), (void)PREFIX_begin())
+#define inner_step(loop, reference, next, reading, volts) PREFIX_volts(reference, reading, volts)
+#define inner_applied(loop, volts) (PREFIX_gave(volts), 1)
+#define inner_reset(loop) PREFIX_forget()
 """
+# What this computer computes for the vectors, to the last bit.
+HOST = """
+#include <stdio.h>
+#include "configuration.h"
+#include "vectors.h"
+/* Of core, which was compiled to unwind; nothing here does. */
+void rust_eh_personality(void);
+void rust_eh_personality(void)
+{
+}
+int main(void)
+{
+    inner_state loop;
+    unsigned i;
+    inner_init(&loop);
+    for (i = 0; i < VECTORS; i++) {
+        const real *row = vectors[i];
+        if (row[4] > 0) {
+            inner_reset(&loop);
+        }
+        printf("%a\\n", (double)inner_step(&loop, row[0], row[1], row[2], row[3]));
+        if (row[5] - row[5] <= 0) {
+            inner_applied(&loop, row[5]);
+        }
+    }
+    return 0;
+}
+"""
+THUMB = "thumbv7em-none-eabihf"
 
 
-@needs_cross
-@pytest.mark.slow
-def test_the_rust_controller_gives_the_same_bits_on_a_board(tmp_path: Path) -> None:
-    target = "thumbv7em-none-eabihf"
+def rust_library(folder: Path, target: str | None) -> Path:
+    """Build the axes in Rust, for this computer or for a board."""
     crate = ROOT / "tests" / "no_std" / "Cargo.toml"
     built = subprocess.run(
         [
             *("cargo", "build", "--locked", "--release", "--manifest-path", str(crate)),
-            *("--target", target, "--target-dir", str(tmp_path / "rust")),
+            *("--target-dir", str(folder / "rust")),
+            *(("--target", target) if target else ()),
         ],
         capture_output=True,
         text=True,
@@ -158,17 +186,94 @@ def test_the_rust_controller_gives_the_same_bits_on_a_board(tmp_path: Path) -> N
     if "target may not be installed" in built.stderr:
         pytest.skip(f"no board is compiled for: {target} is not installed")
     assert built.returncode == 0, built.stderr
-    library = tmp_path / "rust" / target / "release" / "libpiezotrack_no_std.a"
+    return folder / "rust" / (target or "") / "release" / "libpiezotrack_no_std.a"
+
+
+def rust_project(folder: Path, *, single: bool) -> None:
+    """Write a firmware project around an axis in Rust."""
     one = replace(loop("PID"), span=SPAN)
-    pt.control.export_controller(one, tmp_path, to="firmware", name="axis")
-    (tmp_path / "configuration.h").write_text(RUST)
-    makefile = (tmp_path / "Makefile").read_text()
+    pt.control.export_controller(one, folder, to="firmware", name="axis", single=single)
+    texts = ("float", "single") if single else ("double", "axis")
+    written = RUST.replace("REAL", texts[0]).replace("PREFIX", texts[1])
+    (folder / "configuration.h").write_text(written)
+
+
+def linked(folder: Path, library: Path) -> None:
+    makefile = (folder / "Makefile").read_text()
     makefile = makefile.replace(
         "COUNT := count.c mps2_startup.c $(NAME).c", f"COUNT := count.c mps2_startup.c {library}"
     )
-    (tmp_path / "Makefile").write_text(makefile)
+    (folder / "Makefile").write_text(makefile)
+
+
+@needs_cross
+@pytest.mark.slow
+def test_the_rust_controller_gives_the_same_bits_on_a_board(tmp_path: Path) -> None:
+    library = rust_library(tmp_path, THUMB)
+    rust_project(tmp_path, single=False)
+    linked(tmp_path, library)
     printed = made(tmp_path, "count-m4")
     assert "steps apart 0 of 2000" in printed
+
+
+@needs_cross
+@needs_gcc
+@pytest.mark.slow
+def test_the_rust_controller_in_single_precision_gives_the_same_bits_on_a_board(
+    tmp_path: Path,
+) -> None:
+    library, here = rust_library(tmp_path, THUMB), rust_library(tmp_path, None)
+    rust_project(tmp_path, single=True)
+    (tmp_path / "bits.c").write_text(HOST)
+    subprocess.run(["gcc", "-o", "bits", "bits.c", here, "-lm"], cwd=tmp_path, check=True)
+    done = subprocess.run(
+        ["./bits"], cwd=tmp_path, check=True, stdout=subprocess.PIPE, text=True, timeout=60
+    )
+    commands = [float.fromhex(text) for text in done.stdout.split()]
+    assert len(commands) == 2000
+    # Not a loop that does nothing.
+    assert max(commands) == 75.0
+    assert len(set(commands)) > 1000
+    expected = iter(f"{volts:.9e}f" for volts in commands)
+    vectors = (tmp_path / "vectors.h").read_text()
+    vectors = re.sub(r"[^ ]+\},\n", lambda _: next(expected) + "},\n", vectors)
+    vectors = re.sub(r"(VECTORS_BOUND) .*", r"\1 0.0f", vectors)
+    assert next(expected, None) is None
+    (tmp_path / "vectors.h").write_text(vectors)
+    linked(tmp_path, library)
+    assert "steps apart 0 of 2000" in made(tmp_path, "count-m4")
+
+
+@needs_cross
+@pytest.mark.slow
+def test_a_step_of_the_rust_controller_in_single_precision_calls_no_soft_float(
+    tmp_path: Path,
+) -> None:
+    """A linker that collects garbage keeps what the function reaches, and no more.
+
+    `parts_volts` steps every law and every inverse that can be in single precision.
+    """
+    library = rust_library(tmp_path, THUMB)
+
+    def reached(function: str) -> set[str]:
+        archive = str(library)
+        linker = ["arm-none-eabi-ld", "--gc-sections", "-e", function, archive, "-o", "reached"]
+        subprocess.run(linker, cwd=tmp_path, check=True)
+        done = subprocess.run(
+            ["arm-none-eabi-nm", "reached"],
+            cwd=tmp_path,
+            check=True,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        names = {line.split()[-1] for line in done.stdout.splitlines()}
+        assert function in names
+        # Those of Arm's run-time ABI for floating point, from and to integers too.
+        return {one for one in names if re.match(r"__aeabi_(c?[df]|u?[il]2[df]|u?l2[df])", one)}
+
+    assert {"__aeabi_dadd", "__aeabi_dmul"} <= reached("axis_volts")
+    for function in ("single_volts", "single_gave", "single_forget", "parts_volts"):
+        assert not reached(function), function
 
 
 @needs_gcc

@@ -12,5 +12,7 @@ mod metrics;
 mod online_feedforward;
 mod repetitive;
 mod scheduled_pid;
+mod single_precision;
+mod single_precision_feedforward;
 mod tune;
 mod two_axes;

@@ -8,32 +8,45 @@
 //! only, and does not wind up. Counted from the first reading, the filter makes no step where the
 //! law starts, and is kept out of the voltage at which it starts.
 
+use crate::cast::Cast;
+use crate::error::Result;
 use crate::feedback_law::{Feedback, FeedbackSample};
 use crate::filters::{Filter, FilterState};
+use crate::number::Real;
 
 /// A law with a damping filter, for one sampling interval; see
 /// [`crate::IntegralResonantControl::around`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Damped<F> {
+pub struct Damped<F, T = f64> {
     inner: F,
-    filter: Filter,
+    filter: Filter<T>,
 }
 
 /// State of a [`Damped`] law.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DampedState<S> {
+pub struct DampedState<S, T = f64> {
     inner: S,
-    filter: FilterState,
+    filter: FilterState<T>,
     /// y0, m; `None` before the first reading.
-    origin: Option<f64>,
+    origin: Option<T>,
     /// The last output, V.
-    volts: f64,
+    volts: T,
 }
 
-crate::snapshot!([S: crate::Snapshot] DampedState<S> { inner, filter, origin, volts });
+crate::snapshot!(
+    [S: crate::Snapshot, T: Real] DampedState<S, T> { inner, filter, origin, volts }
+);
 
-impl<F> Damped<F> {
-    pub(super) fn new(inner: F, filter: Filter) -> Self {
+impl<F: Cast> Cast for Damped<F> {
+    type In<T: Real> = Damped<F::In<T>, T>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        Ok(Damped { inner: self.inner.cast()?, filter: self.filter.cast()? })
+    }
+}
+
+impl<F, T> Damped<F, T> {
+    pub(super) fn new(inner: F, filter: Filter<T>) -> Self {
         Self { inner, filter }
     }
 
@@ -45,25 +58,25 @@ impl<F> Damped<F> {
 
     /// K: from the filtered measurement (m) to volts.
     #[must_use]
-    pub fn filter(&self) -> &Filter {
+    pub fn filter(&self) -> &Filter<T> {
         &self.filter
     }
 }
 
-impl<S> DampedState<S> {
-    fn new(inner: S, volts: f64) -> Self {
-        Self { inner, filter: Some([0.0; 2]), origin: None, volts }
+impl<S, T: Real> DampedState<S, T> {
+    fn new(inner: S, volts: T) -> Self {
+        Self { inner, filter: Some([T::ZERO; 2]), origin: None, volts }
     }
 }
 
-impl<F: Feedback> Feedback for Damped<F> {
-    type State = DampedState<F::State>;
+impl<F: Feedback<T>, T: Real> Feedback<T> for Damped<F, T> {
+    type State = DampedState<F::State, T>;
 
     fn rest(&self) -> Self::State {
-        DampedState::new(self.inner.rest(), 0.0)
+        DampedState::new(self.inner.rest(), T::ZERO)
     }
 
-    fn start(&self, volts: f64) -> Self::State {
+    fn start(&self, volts: T) -> Self::State {
         DampedState::new(self.inner.start(volts), volts)
     }
 
@@ -73,7 +86,7 @@ impl<F: Feedback> Feedback for Damped<F> {
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, sample: &FeedbackSample) -> f64 {
+    fn step(&self, state: &mut Self::State, sample: &FeedbackSample<T>) -> T {
         let origin = *state.origin.get_or_insert(sample.measured);
         let damping = self.filter.step(&mut state.filter, sample.measured - origin);
         let volts = self.inner.step(&mut state.inner, sample) + damping;
@@ -81,7 +94,7 @@ impl<F: Feedback> Feedback for Damped<F> {
             state.volts = volts;
         } else {
             // Overflow: hold the output, and count from the next reading.
-            (state.filter, state.origin) = (Some([0.0; 2]), None);
+            (state.filter, state.origin) = (Some([T::ZERO; 2]), None);
         }
         state.volts
     }

@@ -17,7 +17,7 @@
 //! which is the symmetric operator with one pair of coefficients for each direction.
 
 use super::{BoucWen, BoucWenBranch, BoucWenState, NonsmoothOperator, Operator};
-use crate::Number;
+use crate::{Number, Real};
 
 /// Asymmetric Bouc-Wen operator.
 ///
@@ -71,7 +71,7 @@ impl<N: Number> AsymmetricBoucWen<N> {
             rise: self.rise,
             beta: direction.mul_add(self.asymmetry, self.beta),
             gamma: direction.mul_add(self.sign_asymmetry, self.gamma),
-            exponent: 1.0,
+            exponent: N::Lane::of(1.0),
         }
     }
 }

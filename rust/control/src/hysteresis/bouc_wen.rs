@@ -19,7 +19,10 @@
 use core::cmp::Ordering;
 
 use super::{NonsmoothOperator, Operator};
-use crate::Number;
+use crate::cast::{Cast, rounded};
+use crate::error::Result;
+use crate::unfused::Unfused;
+use crate::{Number, Real};
 
 /// Bouc-Wen operator.
 ///
@@ -42,7 +45,7 @@ use crate::Number;
 /// assert!((there.value - (1.0 - (-2.0_f64).exp())).abs() < 1e-15);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoucWen<N> {
+pub struct BoucWen<N: Number> {
     /// Slope where the output is 0, A.
     pub rise: N,
     /// Coefficient of the dissipative term, beta.
@@ -50,7 +53,7 @@ pub struct BoucWen<N> {
     /// Coefficient of the non-dissipative term, gamma.
     pub gamma: N,
     /// Exponent n, the sharpness of the transition to saturation; the same for all lanes.
-    pub exponent: f64,
+    pub exponent: N::Lane,
 }
 
 /// State of the operator: its output and the slope.
@@ -85,6 +88,19 @@ const MOST_PIECES: usize = 80;
 /// Most pieces with another exponent.
 const MOST_SHORT_PIECES: usize = 2000;
 
+impl Cast for BoucWen<Unfused> {
+    type In<T: Real> = BoucWen<Unfused<T>>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        Ok(BoucWen {
+            rise: Unfused(rounded("alpha", self.rise.0, "")?),
+            beta: Unfused(rounded("beta", self.beta.0, "")?),
+            gamma: Unfused(rounded("gamma", self.gamma.0, "")?),
+            exponent: rounded("exponent", self.exponent, "")?,
+        })
+    }
+}
+
 impl<N: Number> BoucWen<N> {
     /// The output, counted along the direction of motion, after a path of length `length`.
     #[inline(always)]
@@ -101,7 +117,7 @@ impl<N: Number> BoucWen<N> {
 
     #[inline(always)]
     fn is_exact(&self) -> bool {
-        (self.exponent - 1.0).abs() <= 0.0
+        (self.exponent - N::Lane::of(1.0)).abs() <= N::Lane::ZERO
     }
 
     /// n = 1, in pieces short enough for the series to converge: mostly one piece.
@@ -123,9 +139,10 @@ impl<N: Number> BoucWen<N> {
         let kappa = self.side(z, longest).mul_add(self.gamma, self.beta);
         let slope = kappa.mul_add(-z, self.rise);
         let moving = magnitude(slope * longest);
-        let still = magnitude(z).mul_add(z.like(-1e-9), moving - z.like(f64::MIN_POSITIVE));
+        let still = magnitude(z).mul_add(z.like(-1e-9), moving - z.each(N::Lane::MIN_POSITIVE));
         let rest = N::lanewise([z, slope, kappa, left], |[z, slope, kappa, left]| {
-            if kappa > 0.0 { z - slope / kappa * libm::expm1(-kappa * left) } else { f64::INFINITY }
+            let bounded = z - slope / kappa * (-kappa * left).exp_m1();
+            if kappa > N::Lane::ZERO { bounded } else { N::Lane::INFINITY }
         });
         (-left).where_negative(still.where_negative(z, rest), z)
     }
@@ -159,7 +176,7 @@ impl<N: Number> BoucWen<N> {
         }
         let n = self.exponent;
         N::lanewise([z, kappa, self.rise], move |[z, kappa, rise]| {
-            Bend { rise, beta: kappa, gamma: 0.0, n }.slope(z, kappa)
+            Bend { rise, beta: kappa, gamma: N::Lane::ZERO, n }.slope(z, kappa)
         })
     }
 
@@ -208,73 +225,77 @@ impl<N: Number> NonsmoothOperator<N> for BoucWen<N> {
 
 /// The operator with an exponent other than 1, for scalars.
 #[derive(Clone, Copy)]
-struct Bend {
-    rise: f64,
-    beta: f64,
-    gamma: f64,
-    n: f64,
+struct Bend<T> {
+    rise: T,
+    beta: T,
+    gamma: T,
+    n: T,
 }
 
-impl Bend {
+impl<T: Real> Bend<T> {
     /// Runge-Kutta steps of fourth order along the path, their length limited by the decay rate.
     /// The distance to a sign change of z is found by quadrature over z.
     #[inline(never)]
-    fn advance(self, mut z: f64, length: f64) -> f64 {
+    fn advance(self, mut z: T, length: T) -> T {
+        let (zero, one) = (T::ZERO, T::of(1.0));
         let mut left = length;
         // The rate at the limit that z tends to, on one side of 0.
-        let mut limit = (0.0, 0.0);
+        let mut limit = (zero, zero);
         for _ in 0..MOST_SHORT_PIECES {
-            let side = if z + 1e-12 * self.rise * left < 0.0 { -1.0 } else { 1.0 };
+            let side = if z + T::of(1e-12) * self.rise * left < zero { -one } else { one };
             let kappa = self.beta + side * self.gamma;
-            let power = libm::pow(z.abs(), self.n - 1.0);
+            let power = z.abs().pow(self.n - one);
             // The rate where |z| is largest: here, or at the limit.
             let here = kappa.abs() * power;
-            if limit.0 * side <= 0.0 {
-                let share = 1.0 / self.n;
-                let rate = libm::pow(self.rise.abs(), 1.0 - share);
-                limit = (side, rate * libm::pow(kappa.abs(), share));
+            if limit.0 * side <= zero {
+                let share = one / self.n;
+                let rate = self.rise.abs().pow(one - share);
+                limit = (side, rate * kappa.abs().pow(share));
             }
-            let longest = SHORT_PIECE / (self.n * here.max(limit.1));
+            let fastest = if here.is_nan() { limit.1 } else { here.larger(limit.1) };
+            let longest = T::of(SHORT_PIECE) / (self.n * fastest);
             let more = if left < longest { left } else { longest };
             z = self.piece((z, power), more, side, kappa);
-            left -= more;
+            left = left - more;
             // Written so that NaN ends the loop too.
-            if left.partial_cmp(&0.0) != Some(Ordering::Greater) {
+            if left.partial_cmp(&zero) != Some(Ordering::Greater) {
                 return z;
             }
         }
         // A bounded output has reached its limit by now; any other grows without bound.
-        let kappa = self.beta + if z < 0.0 { -self.gamma } else { self.gamma };
-        if (self.slope(z, kappa) * left).abs() <= 1e-4 * z.abs() { z } else { f64::INFINITY }
+        let kappa = self.beta + if z < zero { -self.gamma } else { self.gamma };
+        let still = (self.slope(z, kappa) * left).abs() <= T::of(1e-4) * z.abs();
+        if still { z } else { T::INFINITY }
     }
 
     /// One step from `z`, whose power of n - 1 is known.
-    fn piece(self, (z, power): (f64, f64), length: f64, side: f64, kappa: f64) -> f64 {
+    fn piece(self, (z, power): (T, T), length: T, side: T, kappa: T) -> T {
         let end = self.runge_kutta((z, power), length, kappa);
-        if side * end >= 0.0 {
+        if side * end >= T::ZERO {
             return end;
         }
         // dp/dz is smooth between z and 0: Boole's rule.
-        let slowness = |part: f64| 1.0 / self.slope(z * part, kappa);
-        let sum = 7.0 * (slowness(1.0) + slowness(0.0))
-            + 32.0 * (slowness(0.75) + slowness(0.25))
-            + 12.0 * slowness(0.5);
-        let rest = length + z * sum / 90.0;
+        let slowness = |part: f64| T::of(1.0) / self.slope(z * T::of(part), kappa);
+        let sum = T::of(7.0) * (slowness(1.0) + slowness(0.0))
+            + T::of(32.0) * (slowness(0.75) + slowness(0.25))
+            + T::of(12.0) * slowness(0.5);
+        let rest = length + z * sum / T::of(90.0);
         // n is above 1: the power of 0 is 0.
-        self.runge_kutta((0.0, 0.0), rest, self.beta - side * self.gamma)
+        self.runge_kutta((T::ZERO, T::ZERO), rest, self.beta - side * self.gamma)
     }
 
-    fn runge_kutta(self, (z, power): (f64, f64), length: f64, kappa: f64) -> f64 {
+    fn runge_kutta(self, (z, power): (T, T), length: T, kappa: T) -> T {
+        let (half, two) = (T::of(0.5), T::of(2.0));
         let k1 = self.rise - kappa * z * power;
-        let k2 = self.slope(z + 0.5 * length * k1, kappa);
-        let k3 = self.slope(z + 0.5 * length * k2, kappa);
+        let k2 = self.slope(z + half * length * k1, kappa);
+        let k3 = self.slope(z + half * length * k2, kappa);
         let k4 = self.slope(z + length * k3, kappa);
-        z + length / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+        z + length / T::of(6.0) * (k1 + two * (k2 + k3) + k4)
     }
 
     /// dz/dp.
-    fn slope(self, z: f64, kappa: f64) -> f64 {
-        self.rise - kappa * z * libm::pow(z.abs(), self.n - 1.0)
+    fn slope(self, z: T, kappa: T) -> T {
+        self.rise - kappa * z * z.abs().pow(self.n - T::of(1.0))
     }
 }
 

@@ -10,7 +10,10 @@
 //! along a monotone section is a power series in the distance, at any speed.
 
 use super::Operator;
-use crate::Number;
+use crate::cast::{Cast, rounded};
+use crate::error::Result;
+use crate::unfused::Unfused;
+use crate::{Number, Real};
 
 /// Second-order Dahl operator with its output scaled to force, for b0 = 0.
 ///
@@ -51,6 +54,18 @@ pub struct DahlBranch<N, const TERMS: usize> {
     force: N,
     /// Derivatives of the force with respect to x, in ascending order from the first.
     derivatives: [N; TERMS],
+}
+
+impl<const TERMS: usize> Cast for Dahl<Unfused, TERMS> {
+    type In<T: Real> = Dahl<Unfused<T>, TERMS>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        Ok(Dahl {
+            a1: Unfused(rounded("a1", self.a1.0, "1/m")?),
+            a2: Unfused(rounded("a2", self.a2.0, "1/m^2")?),
+            gain: Unfused(rounded("up", self.gain.0, "")?),
+        })
+    }
 }
 
 impl<N: Number, const TERMS: usize> Operator<N> for Dahl<N, TERMS> {

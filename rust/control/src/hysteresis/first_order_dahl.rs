@@ -18,7 +18,10 @@
 
 use super::decay::decay;
 use super::{BoucWenBranch, BoucWenState, NonsmoothOperator, Operator};
-use crate::Number;
+use crate::cast::{Cast, rounded};
+use crate::error::Result;
+use crate::unfused::Unfused;
+use crate::{Number, Real};
 
 /// First-order Dahl operator.
 ///
@@ -37,19 +40,31 @@ use crate::Number;
 /// assert!((there.value - 4.0 * (1.0 - (-1.5_f64).exp())).abs() < 1e-15);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FirstOrderDahl<N> {
+pub struct FirstOrderDahl<N: Number> {
     /// Slope where the force is 0, sigma.
     pub rest_stiffness: N,
     /// Coulomb force Fc, reached after a long path in one direction.
     pub coulomb_force: N,
     /// Exponent i, the shape of the transition; the same for all lanes.
-    pub exponent: f64,
+    pub exponent: N::Lane,
+}
+
+impl Cast for FirstOrderDahl<Unfused> {
+    type In<T: Real> = FirstOrderDahl<Unfused<T>>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        Ok(FirstOrderDahl {
+            rest_stiffness: Unfused(rounded("rest_stiffness", self.rest_stiffness.0, "N/m")?),
+            coulomb_force: Unfused(rounded("coulomb_force", self.coulomb_force.0, "N")?),
+            exponent: rounded("exponent", self.exponent, "")?,
+        })
+    }
 }
 
 impl<N: Number> FirstOrderDahl<N> {
     #[inline(always)]
     fn is_exponential(&self) -> bool {
-        (self.exponent - 1.0).abs() <= 0.0
+        (self.exponent - N::Lane::of(1.0)).abs() <= N::Lane::ZERO
     }
 
     /// dF/dx at a force counted along the direction of motion.
@@ -60,7 +75,7 @@ impl<N: Number> FirstOrderDahl<N> {
         }
         let i = self.exponent;
         N::lanewise([force, self.rest_stiffness, self.coulomb_force], move |[f, sigma, limit]| {
-            sigma * power(1.0 - f / limit, i)
+            sigma * power(N::Lane::of(1.0) - f / limit, i)
         })
     }
 }
@@ -95,7 +110,7 @@ impl<N: Number> Operator<N> for FirstOrderDahl<N> {
         let i = self.exponent;
         let arguments = [along, direction * distance, self.rest_stiffness, self.coulomb_force];
         let force = N::lanewise(arguments, move |[f, length, sigma, limit]| {
-            let left = 1.0 - f / limit;
+            let left = N::Lane::of(1.0) - f / limit;
             // In this form a path of length 0 leaves the force unchanged to the last bit.
             f + limit * (left - remainder(left, sigma * length / limit, i))
         });
@@ -111,21 +126,21 @@ impl<N: Number> NonsmoothOperator<N> for FirstOrderDahl<N> {
 }
 
 /// |w|^i sgn(w), 0 at the limit also for i = 0.
-fn power(w: f64, i: f64) -> f64 {
-    let share = if w.abs() > 0.0 { libm::pow(w.abs(), i) } else { 0.0 };
-    libm::copysign(share, w)
+fn power<T: Real>(w: T, i: T) -> T {
+    let share = if w.abs() > T::ZERO { w.abs().pow(i) } else { T::ZERO };
+    share.copysign(w)
 }
 
 /// w after a path of `length` times Fc/sigma that begins at w = `left`, for i other than 1.
-fn remainder(left: f64, length: f64, i: f64) -> f64 {
-    let size = left.abs();
-    if size <= 0.0 {
+fn remainder<T: Real>(left: T, length: T, i: T) -> T {
+    let (size, one) = (left.abs(), T::of(1.0));
+    if size <= T::ZERO {
         return left;
     }
     // |w|^(1-i) falls by (1 - i) length; below 0 the limit has been reached.
-    let change = (i - 1.0) * libm::pow(size, i - 1.0) * length;
-    if change <= -1.0 {
-        return 0.0;
+    let change = (i - one) * size.pow(i - one) * length;
+    if change <= -one {
+        return T::ZERO;
     }
-    left * libm::exp(libm::log1p(change) / (1.0 - i))
+    left * (change.ln_1p() / (one - i)).exp()
 }

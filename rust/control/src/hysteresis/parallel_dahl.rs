@@ -17,7 +17,10 @@
 
 use super::decay::decay;
 use super::{NonsmoothOperator, Operator};
-use crate::Number;
+use crate::cast::{Cast, rounded};
+use crate::error::Result;
+use crate::unfused::Unfused;
+use crate::{Number, Real};
 
 /// How many elements there are.
 pub const FRICTION_ELEMENTS: usize = 3;
@@ -32,7 +35,7 @@ pub const FRICTION_ELEMENTS: usize = 3;
 /// ```
 /// use piezotrack_control::hysteresis::{Operator, ParallelDahl};
 ///
-/// let friction = ParallelDahl::geometric([2.0, 1.0, 0.5], 2.0, 4.0);
+/// let friction = ParallelDahl::geometric([2.0_f64, 1.0, 0.5], 2.0, 4.0);
 /// assert_eq!(friction.coulomb_forces, [4.0, 8.0, 16.0]);
 /// let up = friction.branch(&friction.rest(), 1.0);
 /// let (force, slope) = friction.output(&friction.along(&up, 1000.0));
@@ -63,6 +66,21 @@ pub struct ParallelDahlBranch<N> {
     /// Forces counted along the direction.
     along: [N; FRICTION_ELEMENTS],
     direction: N,
+}
+
+impl Cast for ParallelDahl<Unfused> {
+    type In<T: Real> = ParallelDahl<Unfused<T>>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        let zero = [Unfused(T::ZERO); FRICTION_ELEMENTS];
+        let mut out = ParallelDahl { coulomb_forces: zero, rates: zero };
+        for j in 0..FRICTION_ELEMENTS {
+            let force = rounded("rest_stiffnesses", self.coulomb_forces[j].0, "N")?;
+            let rate = rounded("yield_path", self.rates[j].0, "1/m")?;
+            (out.coulomb_forces[j], out.rates[j]) = (Unfused(force), Unfused(rate));
+        }
+        Ok(out)
+    }
 }
 
 impl<N: Number> ParallelDahl<N> {

@@ -11,9 +11,11 @@
 //! samples, and the operator follows it from turning point to turning point.
 
 use super::Inverse;
+use crate::cast::{Cast, rounded};
 use crate::cubic_segment::{is_straight, legs};
-use crate::error::{Result, check, finite, not_negative, positive, usable};
+use crate::error::{Result, check, finite, not_negative, positive};
 use crate::hysteresis::{Dahl, DahlState, Operator};
+use crate::number::Real;
 use crate::unfused::Unfused;
 
 /// Parameters of the inverse of a Dahl stage.
@@ -127,45 +129,62 @@ const MOST_PIECES: f64 = 2000.0;
 
 /// The inverse for one sampling interval; see [`DahlInverse::at`].
 #[derive(Clone, Copy, Debug)]
-pub struct SampledDahlInverse {
+pub struct SampledDahlInverse<T = f64> {
     /// M/T, V s^2/m.
-    inertia: f64,
+    inertia: T,
     /// D/T, V s/m.
-    damping: f64,
+    damping: T,
     /// K/T, V/m.
-    stiffness: f64,
+    stiffness: T,
     /// b1/T, V for one unit of q1.
-    level: f64,
+    level: T,
     /// b0/T, V for one unit of q2.
-    friction: f64,
+    friction: T,
     /// Its gain is up without b1, so that its output is q1 and q2.
-    operator: Dahl<Unfused, TERMS>,
+    operator: Dahl<Unfused<T>, TERMS>,
     /// Longest move in one piece, m; infinite where the operator is a parabola.
-    piece: f64,
-    dt: f64,
+    piece: T,
+    dt: T,
 }
 
 /// State of a [`SampledDahlInverse`]: the last sample of the reference and the operator's state.
 #[derive(Clone, Copy, Debug)]
-pub struct InverseState {
-    x: f64,
+pub struct InverseState<T = f64> {
+    x: T,
     /// x' times the sampling interval, m; `None` before the first sample.
-    w: Option<f64>,
-    memory: DahlState<Unfused>,
+    w: Option<T>,
+    memory: DahlState<Unfused<T>>,
 }
 
-crate::snapshot!(InverseState { x, w, memory });
+crate::snapshot!([T: Real] InverseState<T> { x, w, memory });
 
-impl SampledDahlInverse {
+impl Cast for SampledDahlInverse {
+    type In<T: Real> = SampledDahlInverse<T>;
+
+    fn cast<T: Real>(&self) -> Result<SampledDahlInverse<T>> {
+        Ok(SampledDahlInverse {
+            inertia: rounded("mass", self.inertia, "V s^2/m")?,
+            damping: rounded("damping", self.damping, "V s/m")?,
+            stiffness: rounded("stiffness", self.stiffness, "V/m")?,
+            level: rounded("b1", self.level, "V")?,
+            friction: rounded("b0", self.friction, "V")?,
+            operator: self.operator.cast()?,
+            piece: rounded("a2", self.piece, "m")?,
+            dt: rounded("dt", self.dt, "s")?,
+        })
+    }
+}
+
+impl<T: Real> SampledDahlInverse<T> {
     /// The state for a stage at rest at 0 that never moved.
     #[must_use]
-    pub fn rest(&self) -> InverseState {
-        InverseState { x: 0.0, w: None, memory: self.operator.rest() }
+    pub fn rest(&self) -> InverseState<T> {
+        InverseState { x: T::ZERO, w: None, memory: self.operator.rest() }
     }
 
     /// M/T, D/T, K/T, b1/T, b0/T, a1, a2, up, and the longest move in one piece (m).
     #[must_use]
-    pub fn coefficients(&self) -> [f64; 9] {
+    pub fn coefficients(&self) -> [T; 9] {
         let Dahl { a1, a2, gain } = self.operator;
         [
             self.inertia,
@@ -187,9 +206,9 @@ impl SampledDahlInverse {
     /// more than 2000 pieces (9 mm with the published a2) away from the last one; a controller
     /// holds its feedforward then.
     #[inline]
-    pub fn step(&self, state: &mut InverseState, x: f64, v: f64, a: f64) -> f64 {
-        if !(usable(x) && usable(v) && usable(a)) {
-            return f64::NAN;
+    pub fn step(&self, state: &mut InverseState<T>, x: T, v: T, a: T) -> T {
+        if !(x.is_usable() && v.is_usable() && a.is_usable()) {
+            return T::NAN;
         }
         let rise = x - state.x;
         let w = v * self.dt;
@@ -197,13 +216,20 @@ impl SampledDahlInverse {
             Some(w0) if !is_straight(w0, rise, w) => self.travel_turning(state.memory, w0, rise, w),
             _ => self.travel(state.memory, rise),
         };
-        let Some(memory) = memory else { return f64::NAN };
-        let sign = f64::from(i8::from(v > 0.0) - i8::from(v < 0.0));
+        let Some(memory) = memory else { return T::NAN };
+        let one = T::of(1.0);
+        let sign = if v > T::ZERO {
+            one
+        } else if v < T::ZERO {
+            -one
+        } else {
+            T::ZERO
+        };
         let linear = self.inertia * a + self.damping * v + self.stiffness * x;
         let hysteresis = self.level * memory.force.0 + sign * self.friction * memory.slope.0;
         let volts = linear + hysteresis;
         if !volts.is_finite() {
-            return f64::NAN;
+            return T::NAN;
         }
         *state = InverseState { x, w: Some(w), memory };
         volts
@@ -211,18 +237,22 @@ impl SampledDahlInverse {
 
     /// The operator's state after a monotone move; `None` where the move is too long.
     #[inline]
-    fn travel(&self, mut memory: DahlState<Unfused>, distance: f64) -> Option<DahlState<Unfused>> {
+    fn travel(
+        &self,
+        mut memory: DahlState<Unfused<T>>,
+        distance: T,
+    ) -> Option<DahlState<Unfused<T>>> {
         let length = distance.abs();
-        let direction = Unfused(if distance < 0.0 { -1.0 } else { 1.0 });
+        let direction = Unfused(if distance < T::ZERO { T::of(-1.0) } else { T::of(1.0) });
         if length > self.piece {
-            if length > MOST_PIECES * self.piece {
+            if length > T::of(MOST_PIECES) * self.piece {
                 return None;
             }
             let mut left = length;
             while left > self.piece {
                 let branch = self.operator.branch(&memory, direction);
                 memory = self.operator.along(&branch, direction * Unfused(self.piece));
-                left -= self.piece;
+                left = left - self.piece;
             }
             let branch = self.operator.branch(&memory, direction);
             return Some(self.operator.along(&branch, direction * Unfused(left)));
@@ -235,11 +265,11 @@ impl SampledDahlInverse {
     #[cold]
     fn travel_turning(
         &self,
-        mut memory: DahlState<Unfused>,
-        w0: f64,
-        rise: f64,
-        w1: f64,
-    ) -> Option<DahlState<Unfused>> {
+        mut memory: DahlState<Unfused<T>>,
+        w0: T,
+        rise: T,
+        w1: T,
+    ) -> Option<DahlState<Unfused<T>>> {
         for leg in legs(w0, rise, w1) {
             memory = self.travel(memory, leg)?;
         }
@@ -247,15 +277,15 @@ impl SampledDahlInverse {
     }
 }
 
-impl Inverse for SampledDahlInverse {
-    type State = InverseState;
+impl<T: Real> Inverse<T> for SampledDahlInverse<T> {
+    type State = InverseState<T>;
 
     fn rest(&self) -> Self::State {
         self.rest()
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+    fn step(&self, state: &mut Self::State, x: T, v: T, a: T) -> T {
         self.step(state, x, v, a)
     }
 }

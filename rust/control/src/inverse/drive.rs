@@ -2,6 +2,7 @@
 //! the amplifier.
 
 use super::Inverse;
+use crate::number::Real;
 
 /// Step that shows by how much the drive increases with the displacement, m.
 const PROBE: f64 = 1e-9;
@@ -18,6 +19,9 @@ const PLACES: u32 = 24;
 /// Relative difference of drives that counts as none: some 1e-16 m.
 const SAME: f64 = 4096.0 * f64::EPSILON;
 
+/// The same in roundings, where those are larger: in single precision.
+const ROUNDINGS: f64 = 16.0;
+
 /// The state of `inverse` after a sample at which the stage got the drive `volts`, and by how much
 /// the stage was off the reference there, in displacement (m) and velocity (m/s).
 ///
@@ -31,28 +35,30 @@ const SAME: f64 = 4096.0 * f64::EPSILON;
 /// inverse is evaluated 42 times at most, some 8 times mostly.
 ///
 /// `None` where there is no such displacement.
-pub fn after_drive<I: Inverse>(
+pub fn after_drive<T: Real, I: Inverse<T>>(
     inverse: &I,
     before: &I::State,
-    target: [f64; 3],
-    off: [f64; 2],
-    dt: f64,
-    volts: f64,
-) -> Option<(I::State, [f64; 2])> {
+    target: [T; 3],
+    off: [T; 2],
+    dt: T,
+    volts: T,
+) -> Option<(I::State, [T; 2])> {
     let [x, v, a] = target;
-    let at = |way: f64| {
+    let (zero, half, probe) = (T::ZERO, T::of(0.5), T::of(PROBE));
+    let at = |way: T| {
         let mut state = *before;
         let faster = way / dt;
         let (x, v, a) = (x + off[0] + way, v + faster, a + (faster - off[1]) / dt);
         (inverse.step(&mut state, x, v, a) - volts, state)
     };
-    let (asked, _) = at(0.0);
-    let beyond = |excess: f64| (excess > 0.0) == (asked > 0.0);
-    let after = |way: f64| [off[0] + way, way / dt];
-    let (mut outside, mut inside, mut found) = (0.0, 0.0, None);
+    let (asked, _) = at(zero);
+    let beyond = |excess: T| (excess > zero) == (asked > zero);
+    let after = |way: T| [off[0] + way, way / dt];
+    let (mut outside, mut inside, mut found) = (zero, zero, None);
     let (mut far, mut near) = (asked, asked);
-    let newton = -asked * PROBE / (at(PROBE).0 - asked);
-    let mut way = if newton.abs() > 0.0 && newton.is_finite() { BEYOND * newton } else { PROBE };
+    let newton = -asked * probe / (at(probe).0 - asked);
+    let mut way =
+        if newton.abs() > zero && newton.is_finite() { T::of(BEYOND) * newton } else { probe };
     'search: for _ in 0..STEPS {
         for place in [way, -way] {
             let (excess, state) = at(place);
@@ -61,10 +67,11 @@ pub fn after_drive<I: Inverse>(
                 break 'search;
             }
         }
-        way *= 4.0;
+        way = way * T::of(4.0);
     }
     found?;
-    let same = SAME * ((asked + volts).abs() + volts.abs());
+    let same = T::of(SAME).larger(T::of(ROUNDINGS) * T::EPSILON);
+    let same = same * ((asked + volts).abs() + volts.abs());
     if near.abs() <= same {
         return found;
     }
@@ -74,7 +81,7 @@ pub fn after_drive<I: Inverse>(
         let crossing = outside - far * (inside - outside) / (near - far);
         let lies =
             (crossing > outside && crossing < inside) || (crossing < outside && crossing > inside);
-        let place = if lies { crossing } else { 0.5 * (outside + inside) };
+        let place = if lies { crossing } else { half * (outside + inside) };
         let (excess, state) = at(place);
         let is_beyond = beyond(excess) || excess.is_nan();
         if excess.abs() <= same {
@@ -83,12 +90,12 @@ pub fn after_drive<I: Inverse>(
         if is_beyond {
             (outside, far) = (place, excess);
             if last == Some(true) {
-                near *= 0.5;
+                near = near * half;
             }
         } else {
             (inside, near, found) = (place, excess, Some((state, after(place))));
             if last == Some(false) {
-                far *= 0.5;
+                far = far * half;
             }
         }
         last = Some(is_beyond);

@@ -9,21 +9,23 @@
 //! explicit. Reversals between two samples are treated as in [`crate::DahlInverse`].
 
 use super::Inverse;
+use crate::cast::{Cast, rounded};
 use crate::cubic_segment::{is_straight, legs};
-use crate::error::{Result, check, finite, not_negative, positive, usable};
+use crate::error::{Result, check, finite, not_negative, positive};
 use crate::hysteresis::{
     BoucWen, BoucWenState, FRICTION_ELEMENTS, FirstOrderDahl, Operator, ParallelDahl,
 };
+use crate::number::Real;
 use crate::unfused::Unfused;
 
 /// Inverse of a stage with first-order Dahl friction.
-pub type FirstOrderDahlInverse = FeedbackInverse<FirstOrderDahl<Unfused>>;
+pub type FirstOrderDahlInverse<T = f64> = FeedbackInverse<FirstOrderDahl<Unfused<T>>, T>;
 
 /// Inverse of a stage with first-order Dahl elements in parallel.
-pub type ParallelDahlInverse = FeedbackInverse<ParallelDahl<Unfused>>;
+pub type ParallelDahlInverse<T = f64> = FeedbackInverse<ParallelDahl<Unfused<T>>, T>;
 
 /// Inverse of a Bouc-Wen oscillator; its drive is a force, N.
-pub type OscillatorInverse = FeedbackInverse<BoucWen<Unfused>>;
+pub type OscillatorInverse<T = f64> = FeedbackInverse<BoucWen<Unfused<T>>, T>;
 
 /// Inverse of a stage with the operator `O` in feedback, for one sampling interval.
 ///
@@ -37,27 +39,27 @@ pub type OscillatorInverse = FeedbackInverse<BoucWen<Unfused>>;
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct FeedbackInverse<O> {
+pub struct FeedbackInverse<O, T = f64> {
     /// M/T, D/T and K/T.
-    inertia: f64,
-    damping: f64,
-    stiffness: f64,
+    inertia: T,
+    damping: T,
+    stiffness: T,
     /// T, N for one unit of the drive.
-    gain: f64,
+    gain: T,
     operator: O,
-    dt: f64,
+    dt: T,
 }
 
 /// State of a [`FeedbackInverse`]: the last sample of the reference and the operator's state.
 #[derive(Clone, Copy, Debug)]
-pub struct FeedbackInverseState<M = BoucWenState<Unfused>> {
-    x: f64,
+pub struct FeedbackInverseState<M = BoucWenState<Unfused>, T = f64> {
+    x: T,
     /// x' times the sampling interval, m; `None` before the first sample.
-    w: Option<f64>,
+    w: Option<T>,
     memory: M,
 }
 
-crate::snapshot!([M: crate::Snapshot] FeedbackInverseState<M> { x, w, memory });
+crate::snapshot!([M: crate::Snapshot, T: Real] FeedbackInverseState<M, T> { x, w, memory });
 
 impl FirstOrderDahlInverse {
     /// The inverse of the stage with this mass (kg), damping (N s/m), stiffness (N/m) and piezo
@@ -153,11 +155,28 @@ impl<O: Operator<Unfused>> FeedbackInverse<O> {
             dt: positive("dt", dt, "s")?,
         })
     }
+}
 
+impl<O: Cast> Cast for FeedbackInverse<O> {
+    type In<T: Real> = FeedbackInverse<O::In<T>, T>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        Ok(FeedbackInverse {
+            inertia: rounded("mass", self.inertia, "")?,
+            damping: rounded("damping", self.damping, "")?,
+            stiffness: rounded("stiffness", self.stiffness, "")?,
+            gain: rounded("piezo_coefficient", self.gain, "N/V")?,
+            operator: self.operator.cast()?,
+            dt: rounded("dt", self.dt, "s")?,
+        })
+    }
+}
+
+impl<O: Operator<Unfused<T>>, T: Real> FeedbackInverse<O, T> {
     /// The state for a stage at rest at 0 that never moved.
     #[must_use]
-    pub fn rest(&self) -> FeedbackInverseState<O::State> {
-        FeedbackInverseState { x: 0.0, w: None, memory: self.operator.rest() }
+    pub fn rest(&self) -> FeedbackInverseState<O::State, T> {
+        FeedbackInverseState { x: T::ZERO, w: None, memory: self.operator.rest() }
     }
 
     /// The drive for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of the
@@ -165,41 +184,41 @@ impl<O: Operator<Unfused>> FeedbackInverse<O> {
     ///
     /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100), or the
     /// hysteresis force grows without bound; a controller holds its feedforward then.
-    pub fn step(&self, state: &mut FeedbackInverseState<O::State>, x: f64, v: f64, a: f64) -> f64 {
-        if !(usable(x) && usable(v) && usable(a)) {
-            return f64::NAN;
+    pub fn step(&self, state: &mut FeedbackInverseState<O::State, T>, x: T, v: T, a: T) -> T {
+        if !(x.is_usable() && v.is_usable() && a.is_usable()) {
+            return T::NAN;
         }
         let (rise, w) = (x - state.x, v * self.dt);
         let legs = match state.w {
             Some(w0) if !is_straight(w0, rise, w) => legs(w0, rise, w),
-            _ => [rise, 0.0, 0.0],
+            _ => [rise, T::ZERO, T::ZERO],
         };
         let memory = legs.iter().fold(state.memory, |memory, &leg| {
-            if leg == 0.0 {
+            if leg == T::ZERO {
                 return memory;
             }
-            let branch = self.operator.branch(&memory, Unfused(leg.signum()));
+            let branch = self.operator.branch(&memory, Unfused(T::of(1.0).copysign(leg)));
             self.operator.along(&branch, Unfused(leg))
         });
         let linear = self.inertia * a + self.damping * v + self.stiffness * x;
         let drive = linear + self.operator.output(&memory).0.0 / self.gain;
         if !drive.is_finite() {
-            return f64::NAN;
+            return T::NAN;
         }
         *state = FeedbackInverseState { x, w: Some(w), memory };
         drive
     }
 }
 
-impl<O: Operator<Unfused>> Inverse for FeedbackInverse<O> {
-    type State = FeedbackInverseState<O::State>;
+impl<O: Operator<Unfused<T>>, T: Real> Inverse<T> for FeedbackInverse<O, T> {
+    type State = FeedbackInverseState<O::State, T>;
 
     fn rest(&self) -> Self::State {
         self.rest()
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+    fn step(&self, state: &mut Self::State, x: T, v: T, a: T) -> T {
         self.step(state, x, v, a)
     }
 }

@@ -13,13 +13,15 @@
 //! 10.3166/ejc.9.407-418.
 
 use super::{Inverse, ModesInverse, ModesInverseState, PlayInverse};
+use crate::cast::{Cast, rounded};
 use crate::creep::{Creep, CreepInverse, CreepState};
-use crate::dynamics::Dynamics;
-use crate::error::{Result, usable};
+use crate::dynamics::{Derivatives, Dynamics};
+use crate::error::Result;
 use crate::hysteresis::{Operator, Play, PlayState};
+use crate::number::Real;
 
 /// Inverse of a hysteresis operator: output in, input out.
-pub trait OperatorInverse: Copy {
+pub trait OperatorInverse<T = f64>: Copy {
     /// Its state, which depends on the path.
     type State: Copy;
 
@@ -28,18 +30,20 @@ pub trait OperatorInverse: Copy {
 
     /// Takes the output of the operator to `output` and returns its input; NaN, with the state
     /// unchanged, where there is none.
-    fn follow(&self, state: &mut Self::State, output: f64) -> f64;
+    fn follow(&self, state: &mut Self::State, output: T) -> T;
 }
 
-impl<const PLAYS: usize, const ZONES: usize> OperatorInverse for PlayInverse<PLAYS, ZONES> {
-    type State = PlayState<f64, PLAYS>;
+impl<const PLAYS: usize, const ZONES: usize, T: Real> OperatorInverse<T>
+    for PlayInverse<PLAYS, ZONES, T>
+{
+    type State = PlayState<T, PLAYS>;
 
     fn rest(&self) -> Self::State {
         PlayInverse::rest(self)
     }
 
     #[inline]
-    fn follow(&self, state: &mut Self::State, output: f64) -> f64 {
+    fn follow(&self, state: &mut Self::State, output: T) -> T {
         PlayInverse::follow(self, state, output)
     }
 }
@@ -66,14 +70,14 @@ impl<const PLAYS: usize, const ZONES: usize> OperatorInverse for PlayInverse<PLA
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InputInverse<I, const RELAXATIONS: usize> {
+pub struct InputInverse<I, const RELAXATIONS: usize, T = f64> {
     inverse: I,
-    creep: CreepInverse<RELAXATIONS>,
-    dynamics: Dynamics,
+    creep: CreepInverse<RELAXATIONS, T>,
+    dynamics: Derivatives<T>,
     /// Of the dynamics, where they are several modes.
-    modes: Option<ModesInverse>,
+    modes: Option<ModesInverse<T>>,
     /// H(0) before the zero is taken off, m: the operator's output at rest.
-    zero: f64,
+    zero: T,
 }
 
 /// Inverse of a Prandtl-Ishlinskii stage, whose operator has its weights in m/V and its dead
@@ -82,21 +86,22 @@ pub type PrandtlIshlinskiiInverse<
     const PLAYS: usize,
     const ZONES: usize,
     const RELAXATIONS: usize,
-> = InputInverse<PlayInverse<PLAYS, ZONES>, RELAXATIONS>;
+    T = f64,
+> = InputInverse<PlayInverse<PLAYS, ZONES, T>, RELAXATIONS, T>;
 
 /// State of an [`InputInverse`]; `S` is the state of the operator's inverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InputInverseState<S, const RELAXATIONS: usize> {
+pub struct InputInverseState<S, const RELAXATIONS: usize, T = f64> {
     operator: S,
-    creep: CreepState<RELAXATIONS>,
-    modes: ModesInverseState,
+    creep: CreepState<RELAXATIONS, T>,
+    modes: ModesInverseState<T>,
     /// Whether the first sample has been.
     begun: bool,
 }
 
 crate::snapshot!(
-    [S: crate::Snapshot, const RELAXATIONS: usize]
-    InputInverseState<S, RELAXATIONS> { operator, creep, modes, begun }
+    [S: crate::Snapshot, const RELAXATIONS: usize, T: Real]
+    InputInverseState<S, RELAXATIONS, T> { operator, creep, modes, begun }
 );
 
 impl<const PLAYS: usize, const ZONES: usize, const RELAXATIONS: usize>
@@ -137,9 +142,25 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
             Dynamics::Modes(modes) => Some(ModesInverse::new(&modes, dt)?),
             _ => None,
         };
-        Ok(Self { inverse, creep, dynamics, modes, zero })
+        Ok(Self { inverse, creep, dynamics: Derivatives::of(&dynamics), modes, zero })
     }
+}
 
+impl<I: Cast, const RELAXATIONS: usize> Cast for InputInverse<I, RELAXATIONS> {
+    type In<T: Real> = InputInverse<I::In<T>, RELAXATIONS, T>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        Ok(InputInverse {
+            inverse: self.inverse.cast()?,
+            creep: self.creep.cast()?,
+            dynamics: self.dynamics.cast()?,
+            modes: self.modes.as_ref().map(ModesInverse::cast).transpose()?,
+            zero: rounded("zero", self.zero, "m")?,
+        })
+    }
+}
+
+impl<I: OperatorInverse<T>, const RELAXATIONS: usize, T: Real> InputInverse<I, RELAXATIONS, T> {
     /// The inverse of the operator.
     #[must_use]
     pub fn operator(&self) -> &I {
@@ -148,7 +169,7 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
 
     /// The state for a stage at rest that never moved.
     #[must_use]
-    pub fn rest(&self) -> InputInverseState<I::State, RELAXATIONS> {
+    pub fn rest(&self) -> InputInverseState<I::State, RELAXATIONS, T> {
         self.start(self.inverse.rest(), CreepState::default())
     }
 
@@ -157,8 +178,8 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
     pub fn start(
         &self,
         operator: I::State,
-        creep: CreepState<RELAXATIONS>,
-    ) -> InputInverseState<I::State, RELAXATIONS> {
+        creep: CreepState<RELAXATIONS, T>,
+    ) -> InputInverseState<I::State, RELAXATIONS, T> {
         InputInverseState { operator, creep, modes: ModesInverseState::default(), begun: false }
     }
 
@@ -171,11 +192,11 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
     #[inline]
     pub fn step(
         &self,
-        state: &mut InputInverseState<I::State, RELAXATIONS>,
-        x: f64,
-        v: f64,
-        a: f64,
-    ) -> f64 {
+        state: &mut InputInverseState<I::State, RELAXATIONS, T>,
+        x: T,
+        v: T,
+        a: T,
+    ) -> T {
         let mut modes = state.modes;
         let target = match &self.modes {
             None => self.dynamics.inverse(x, v, a),
@@ -188,8 +209,8 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
                 inverse.output(&modes)
             }
         };
-        if !usable(target) {
-            return f64::NAN;
+        if !target.is_usable() {
+            return T::NAN;
         }
         let mut creep = state.creep;
         let output = if state.begun {
@@ -205,15 +226,17 @@ impl<I: OperatorInverse, const RELAXATIONS: usize> InputInverse<I, RELAXATIONS> 
     }
 }
 
-impl<I: OperatorInverse, const RELAXATIONS: usize> Inverse for InputInverse<I, RELAXATIONS> {
-    type State = InputInverseState<I::State, RELAXATIONS>;
+impl<I: OperatorInverse<T>, const RELAXATIONS: usize, T: Real> Inverse<T>
+    for InputInverse<I, RELAXATIONS, T>
+{
+    type State = InputInverseState<I::State, RELAXATIONS, T>;
 
     fn rest(&self) -> Self::State {
         self.rest()
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+    fn step(&self, state: &mut Self::State, x: T, v: T, a: T) -> T {
         self.step(state, x, v, a)
     }
 }

@@ -11,9 +11,11 @@
 
 use super::Inverse;
 use super::feedback::not_zero;
+use crate::cast::{Cast, rounded};
 use crate::cubic_motion::CubicVelocity;
-use crate::error::{Result, not_negative, positive, usable};
+use crate::error::{Result, not_negative, positive};
 use crate::hysteresis::LuGre;
+use crate::number::Real;
 use crate::unfused::Unfused;
 
 /// Inverse of a stage with LuGre friction, for one sampling interval.
@@ -36,26 +38,26 @@ use crate::unfused::Unfused;
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LuGreInverse {
-    mass: f64,
-    damping: f64,
-    stiffness: f64,
+pub struct LuGreInverse<T = f64> {
+    mass: T,
+    damping: T,
+    stiffness: T,
     /// T, N/V.
-    gain: f64,
-    friction: LuGre<Unfused>,
-    dt: f64,
+    gain: T,
+    friction: LuGre<Unfused<T>>,
+    dt: T,
 }
 
 /// State of a [`LuGreInverse`]: the last sample of the reference and the deflection, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LuGreInverseState {
-    x: f64,
+pub struct LuGreInverseState<T = f64> {
+    x: T,
     /// x' times the sampling interval, m; `None` before the first sample.
-    w: Option<f64>,
-    deflection: f64,
+    w: Option<T>,
+    deflection: T,
 }
 
-crate::snapshot!(LuGreInverseState { x, w, deflection });
+crate::snapshot!([T: Real] LuGreInverseState<T> { x, w, deflection });
 
 impl LuGreInverse {
     /// The inverse of the stage with this mass (kg), damping (N s/m) with that of the friction's
@@ -92,11 +94,40 @@ impl LuGreInverse {
             dt: positive("dt", dt, "s")?,
         })
     }
+}
 
+impl Cast for LuGreInverse {
+    type In<T: Real> = LuGreInverse<T>;
+
+    fn cast<T: Real>(&self) -> Result<LuGreInverse<T>> {
+        let LuGre { rest_stiffness, micro_damping, coulomb_force, static_force, stribeck_velocity } =
+            self.friction;
+        Ok(LuGreInverse {
+            mass: rounded("mass", self.mass, "kg")?,
+            damping: rounded("damping", self.damping, "N s/m")?,
+            stiffness: rounded("stiffness", self.stiffness, "N/m")?,
+            gain: rounded("piezo_coefficient", self.gain, "N/V")?,
+            friction: LuGre {
+                rest_stiffness: Unfused(rounded("rest_stiffness", rest_stiffness.0, "N/m")?),
+                micro_damping: Unfused(rounded("micro_damping", micro_damping.0, "N s/m")?),
+                coulomb_force: Unfused(rounded("coulomb_force", coulomb_force.0, "N")?),
+                static_force: Unfused(rounded("static_force", static_force.0, "N")?),
+                stribeck_velocity: Unfused(rounded(
+                    "stribeck_velocity",
+                    stribeck_velocity.0,
+                    "m/s",
+                )?),
+            },
+            dt: rounded("dt", self.dt, "s")?,
+        })
+    }
+}
+
+impl<T: Real> LuGreInverse<T> {
     /// The state for a stage at rest at 0 that never moved.
     #[must_use]
-    pub fn rest(&self) -> LuGreInverseState {
-        LuGreInverseState { x: 0.0, w: None, deflection: 0.0 }
+    pub fn rest(&self) -> LuGreInverseState<T> {
+        LuGreInverseState { x: T::ZERO, w: None, deflection: T::ZERO }
     }
 
     /// The drive for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of the
@@ -104,46 +135,46 @@ impl LuGreInverse {
     ///
     /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100); a controller
     /// holds its feedforward then.
-    pub fn step(&self, state: &mut LuGreInverseState, x: f64, v: f64, a: f64) -> f64 {
-        if !(usable(x) && usable(v) && usable(a)) {
-            return f64::NAN;
+    pub fn step(&self, state: &mut LuGreInverseState<T>, x: T, v: T, a: T) -> T {
+        if !(x.is_usable() && v.is_usable() && a.is_usable()) {
+            return T::NAN;
         }
         let (rise, w) = (x - state.x, v * self.dt);
         let deflection = Unfused(state.deflection);
-        let direction = |of: f64| Unfused(if of < 0.0 { -1.0 } else { 1.0 });
+        let direction = |of: T| Unfused(if of < T::ZERO { T::of(-1.0) } else { T::of(1.0) });
         let Unfused(deflection) = match state.w {
             None => {
                 let side = direction(rise);
-                let still = [Unfused(0.0); 3];
+                let still = [Unfused(T::ZERO); 3];
                 side * self.friction.along(side * deflection, side * Unfused(rise), still)
             }
             Some(w0) => {
                 let ends = [[Unfused(state.x), Unfused(w0)], [Unfused(x), Unfused(w)]];
-                let side = direction(if w0 == 0.0 { rise } else { w0 });
+                let side = direction(if w0 == T::ZERO { rise } else { w0 });
                 let velocity = CubicVelocity::along(side, ends[0], ends[1]);
-                self.friction.through(deflection, &velocity, ends, Unfused(1.0 / self.dt))
+                self.friction.through(deflection, &velocity, ends, Unfused(T::of(1.0) / self.dt))
             }
         };
         let force = self.friction.force(Unfused(deflection), Unfused(v)).0;
         let linear = self.mass * a + self.damping * v + self.stiffness * x;
         let drive = (linear + force) / self.gain;
         if !drive.is_finite() {
-            return f64::NAN;
+            return T::NAN;
         }
         *state = LuGreInverseState { x, w: Some(w), deflection };
         drive
     }
 }
 
-impl Inverse for LuGreInverse {
-    type State = LuGreInverseState;
+impl<T: Real> Inverse<T> for LuGreInverse<T> {
+    type State = LuGreInverseState<T>;
 
     fn rest(&self) -> Self::State {
         self.rest()
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+    fn step(&self, state: &mut Self::State, x: T, v: T, a: T) -> T {
         self.step(state, x, v, a)
     }
 }

@@ -33,7 +33,7 @@ pub use neural_network::{
 };
 pub use play::PlayInverse;
 
-/// Inverse of a stage model: configuration in `&self`, memory in `State`.
+/// Inverse of a stage model in the real type `T`: configuration in `&self`, memory in `State`.
 ///
 /// A choice of models at run time is an enum of inverses with an enum of their states; where the
 /// two do not belong together, `step` returns NaN:
@@ -76,7 +76,7 @@ pub use play::PlayInverse;
 /// assert_eq!(any.step(&mut state, 0.0, 0.0, 0.0), 0.0);
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
-pub trait Inverse {
+pub trait Inverse<T = f64> {
     /// State of the inverse, which depends on the path of the reference.
     type State: Copy;
 
@@ -87,5 +87,5 @@ pub trait Inverse {
     /// acceleration `a` (m/s^2) of the reference at the next sample.
     ///
     /// NaN, with the state unchanged, where there is no such drive or an input is not finite.
-    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64;
+    fn step(&self, state: &mut Self::State, x: T, v: T, a: T) -> T;
 }

@@ -11,8 +11,10 @@
 
 use core::f64::consts::TAU;
 
+use crate::cast::{Cast, all_rounded, rounded};
 use crate::dynamics::{MOST_MODES, Mode, Modes};
 use crate::error::{Error, Result, positive};
+use crate::number::Real;
 
 /// States of the filter: displacement and scaled velocity of each mode beside the main one.
 const STATES: usize = 2 * (MOST_MODES - 1);
@@ -40,31 +42,31 @@ type Matrix = [[f64; SIZE]; SIZE];
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ModesInverse {
+pub struct ModesInverse<T = f64> {
     /// Rows of the step of the state: of the state, the old input and its rise.
-    step: [[f64; SIZE]; STATES],
+    step: [[T; SIZE]; STATES],
     /// Share of each state in the output.
-    output: [f64; STATES],
+    output: [T; STATES],
     /// Share of the input in it.
-    direct: f64,
+    direct: T,
     /// Share of the velocity in the input, s.
-    velocity: f64,
+    velocity: T,
     /// Share of the acceleration in the input, s^2.
-    acceleration: f64,
+    acceleration: T,
     /// Velocity scales of the modes, s.
-    scales: [f64; STATES],
+    scales: [T; STATES],
 }
 
 /// State of a [`ModesInverse`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ModesInverseState {
+pub struct ModesInverseState<T = f64> {
     /// Displacement and scaled velocity of each mode beside the main one, m.
-    modes: [f64; STATES],
+    modes: [T; STATES],
     /// The input at the last sample, m.
-    input: f64,
+    input: T,
 }
 
-crate::snapshot!(ModesInverseState { modes, input });
+crate::snapshot!([T: Real] ModesInverseState<T> { modes, input });
 
 impl ModesInverse {
     /// The inverse for samples every `dt` seconds.
@@ -120,15 +122,36 @@ impl ModesInverse {
         let acceleration = 1.0 / (natural * natural);
         Ok(Self { step, output, direct, velocity, acceleration, scales })
     }
+}
 
-    fn input(&self, x: f64, v: f64, a: f64) -> f64 {
+impl Cast for ModesInverse {
+    type In<T: Real> = ModesInverse<T>;
+
+    fn cast<T: Real>(&self) -> Result<ModesInverse<T>> {
+        let mut step = [[T::ZERO; SIZE]; STATES];
+        for (row, own) in step.iter_mut().zip(&self.step) {
+            *row = all_rounded("mode_frequencies", own, "")?;
+        }
+        Ok(ModesInverse {
+            step,
+            output: all_rounded("mode_weights", &self.output, "")?,
+            direct: rounded("mode_weights", self.direct, "")?,
+            velocity: rounded("frequency", self.velocity, "s")?,
+            acceleration: rounded("frequency", self.acceleration, "s^2")?,
+            scales: all_rounded("mode_frequencies", &self.scales, "s")?,
+        })
+    }
+}
+
+impl<T: Real> ModesInverse<T> {
+    fn input(&self, x: T, v: T, a: T) -> T {
         x + self.velocity * v + self.acceleration * a
     }
 
     /// The state where all modes move together, with displacement `x` (m), velocity `v` (m/s) and
     /// acceleration `a` (m/s^2).
     #[must_use]
-    pub fn begin(&self, x: f64, v: f64, a: f64) -> ModesInverseState {
+    pub fn begin(&self, x: T, v: T, a: T) -> ModesInverseState<T> {
         let mut modes = self.scales;
         for pair in modes.chunks_exact_mut(2) {
             if let [place, speed] = pair {
@@ -140,12 +163,13 @@ impl ModesInverse {
 
     /// One sample on, to displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2).
     #[inline]
-    pub fn step(&self, state: &mut ModesInverseState, x: f64, v: f64, a: f64) {
+    pub fn step(&self, state: &mut ModesInverseState<T>, x: T, v: T, a: T) {
         let input = self.input(x, v, a);
         let rise = input - state.input;
         let before = state.modes;
         for (row, next) in self.step.iter().zip(&mut state.modes) {
-            let moved: f64 = row.iter().zip(&before).map(|(share, mode)| share * mode).sum();
+            let shares = row.iter().zip(&before);
+            let moved = shares.fold(-T::ZERO, |sum, (share, mode)| sum + *share * *mode);
             *next = moved + row[STATES] * state.input + row[STATES + 1] * rise;
         }
         state.input = input;
@@ -154,9 +178,9 @@ impl ModesInverse {
     /// The static displacement d, m.
     #[must_use]
     #[inline]
-    pub fn output(&self, state: &ModesInverseState) -> f64 {
+    pub fn output(&self, state: &ModesInverseState<T>) -> T {
         let modes = self.output.iter().zip(&state.modes);
-        modes.fold(self.direct * state.input, |sum, (share, mode)| sum + share * mode)
+        modes.fold(self.direct * state.input, |sum, (share, mode)| sum + *share * *mode)
     }
 }
 

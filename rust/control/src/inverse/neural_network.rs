@@ -10,7 +10,9 @@
 //! Prandtl-Ishlinskii model where the hidden layer gives nothing.
 
 use super::Inverse;
+use crate::cast::{Cast, all_rounded, rounded};
 use crate::error::{Result, check, finite, positive, usable};
+use crate::number::Real;
 
 /// Units of the hidden layer, at most.
 pub const MOST_UNITS: usize = 16;
@@ -73,26 +75,26 @@ pub struct NetworkNumbers<'a> {
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NeuralNetworkInverse {
-    centre: f64,
-    scales: [f64; 3],
+pub struct NeuralNetworkInverse<T = f64> {
+    centre: T,
+    scales: [T; 3],
     plays: usize,
     units: usize,
-    thresholds: [f64; MOST_NETWORK_PLAYS],
-    hidden: [[f64; INPUTS]; MOST_UNITS],
-    biases: [f64; MOST_UNITS],
-    outputs: [f64; MOST_UNITS],
-    direct: [f64; INPUTS],
-    offset: f64,
+    thresholds: [T; MOST_NETWORK_PLAYS],
+    hidden: [[T; INPUTS]; MOST_UNITS],
+    biases: [T; MOST_UNITS],
+    outputs: [T; MOST_UNITS],
+    direct: [T; INPUTS],
+    offset: T,
 }
 
 /// State of a [`NeuralNetworkInverse`]: the outputs of its plays.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NeuralNetworkState {
-    plays: [f64; MOST_NETWORK_PLAYS],
+pub struct NeuralNetworkState<T = f64> {
+    plays: [T; MOST_NETWORK_PLAYS],
 }
 
-crate::snapshot!(NeuralNetworkState { plays });
+crate::snapshot!([T: Real] NeuralNetworkState<T> { plays });
 
 impl NeuralNetworkInverse {
     /// A network with these numbers.
@@ -150,40 +152,68 @@ impl NeuralNetworkInverse {
     }
 }
 
-impl Inverse for NeuralNetworkInverse {
-    type State = NeuralNetworkState;
+impl Cast for NeuralNetworkInverse {
+    type In<T: Real> = NeuralNetworkInverse<T>;
+
+    fn cast<T: Real>(&self) -> Result<NeuralNetworkInverse<T>> {
+        let mut hidden = [[T::ZERO; INPUTS]; MOST_UNITS];
+        for (row, own) in hidden.iter_mut().zip(&self.hidden) {
+            *row = all_rounded("hidden", own, "")?;
+        }
+        Ok(NeuralNetworkInverse {
+            centre: rounded("centre", self.centre, "m")?,
+            scales: all_rounded("scales", &self.scales, "")?,
+            plays: self.plays,
+            units: self.units,
+            thresholds: all_rounded("thresholds", &self.thresholds, "")?,
+            hidden,
+            biases: all_rounded("biases", &self.biases, "")?,
+            outputs: all_rounded("outputs", &self.outputs, "V")?,
+            direct: all_rounded("direct", &self.direct, "V")?,
+            offset: rounded("offset", self.offset, "V")?,
+        })
+    }
+}
+
+/// A scaled input, within what counts as learnt.
+#[inline(always)]
+fn within<T: Real>(value: T) -> T {
+    value.larger(T::of(-FARTHEST)).smaller(T::of(FARTHEST))
+}
+
+impl<T: Real> Inverse<T> for NeuralNetworkInverse<T> {
+    type State = NeuralNetworkState<T>;
 
     /// Of a stage at 0 that never moved: all plays are there.
-    fn rest(&self) -> NeuralNetworkState {
-        let there = (-self.centre / self.scales[0]).clamp(-FARTHEST, FARTHEST);
-        NeuralNetworkState { plays: [there; MOST_NETWORK_PLAYS] }
+    fn rest(&self) -> NeuralNetworkState<T> {
+        NeuralNetworkState { plays: [within(-self.centre / self.scales[0]); MOST_NETWORK_PLAYS] }
     }
 
     /// Finite for finite inputs: what is far beyond what was learnt counts as its edge.
     #[inline]
-    fn step(&self, state: &mut NeuralNetworkState, x: f64, v: f64, a: f64) -> f64 {
+    fn step(&self, state: &mut NeuralNetworkState<T>, x: T, v: T, a: T) -> T {
         let motion = [x - self.centre, v, a];
         if !motion.iter().all(|one| one.is_finite()) {
-            return f64::NAN;
+            return T::NAN;
         }
-        let mut inputs = [0.0; INPUTS];
+        let mut inputs = [T::ZERO; INPUTS];
         for i in 0..3 {
-            inputs[i] = (motion[i] / self.scales[i]).clamp(-FARTHEST, FARTHEST);
+            inputs[i] = within(motion[i] / self.scales[i]);
         }
         for i in 0..self.plays {
             let (here, r) = (inputs[0], self.thresholds[i]);
-            // Not `clamp`, which has no answer where rounding leaves the ends in another order.
-            state.plays[i] = state.plays[i].min(here + r).max(here - r);
+            state.plays[i] = state.plays[i].smaller(here + r).larger(here - r);
             inputs[3 + i] = state.plays[i];
         }
         let count = 3 + self.plays;
-        let sum = |weights: &[f64; INPUTS]| {
-            weights[..count].iter().zip(&inputs).map(|(w, i)| w * i).sum::<f64>()
+        let sum = |weights: &[T; INPUTS]| {
+            let pairs = weights[..count].iter().zip(&inputs);
+            pairs.fold(-T::ZERO, |sum, (weight, input)| sum + *weight * *input)
         };
         let mut drive = self.offset + sum(&self.direct);
         for unit in 0..self.units {
             let activation = sum(&self.hidden[unit]) + self.biases[unit];
-            drive += self.outputs[unit] * libm::tanh(activation);
+            drive = drive + self.outputs[unit] * activation.tanh();
         }
         drive
     }

@@ -14,8 +14,10 @@
 //! takes as long as one of the operator. It holds for negative weights too.
 
 use super::Inverse;
-use crate::error::{Result, check, finite, not_negative, usable};
+use crate::cast::{Cast, all_rounded, rounded};
+use crate::error::{Result, check, finite, not_negative};
 use crate::hysteresis::{Operator, Play, PlayState};
+use crate::number::Real;
 
 /// Inverse of a [`Play`] with `PLAYS` play operators and `ZONES` dead zones: output in, input out.
 ///
@@ -41,13 +43,13 @@ use crate::hysteresis::{Operator, Play, PlayState};
 /// # }
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlayInverse<const PLAYS: usize, const ZONES: usize> {
+pub struct PlayInverse<const PLAYS: usize, const ZONES: usize, T = f64> {
     /// Thresholds of the dead zones at the output, d'.
-    dead_zone_thresholds: [f64; ZONES],
+    dead_zone_thresholds: [T; ZONES],
     /// Changes of the slope of the inverse there, s'.
-    dead_zone_weights: [f64; ZONES],
+    dead_zone_weights: [T; ZONES],
     /// Play operators with transformed thresholds and weights, without dead zones.
-    plays: Play<f64, PLAYS, 0>,
+    plays: Play<T, PLAYS, 0>,
 }
 
 impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
@@ -62,12 +64,6 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
         Ok(Self { dead_zone_thresholds, dead_zone_weights, plays: plays(play)? })
     }
 
-    /// The state of the inverse of an operator at rest.
-    #[must_use]
-    pub fn rest(&self) -> PlayState<f64, PLAYS> {
-        self.plays.rest()
-    }
-
     /// The state of the inverse of the operator `play` in the state `state`.
     #[must_use]
     pub fn memory<const ANY: usize>(
@@ -75,7 +71,7 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
         play: &Play<f64, PLAYS, ANY>,
         state: &PlayState<f64, PLAYS>,
     ) -> PlayState<f64, PLAYS> {
-        let mut inverse = self.rest();
+        let mut inverse = self.plays.rest();
         let mut sum = play.linear;
         let weighted = play.weights.iter().zip(&state.plays);
         let mut after: f64 = weighted.map(|(weight, play)| weight * play).sum();
@@ -87,6 +83,36 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
         }
         inverse
     }
+}
+
+impl<const PLAYS: usize, const ZONES: usize> Cast for PlayInverse<PLAYS, ZONES> {
+    type In<T: Real> = PlayInverse<PLAYS, ZONES, T>;
+
+    fn cast<T: Real>(&self) -> Result<PlayInverse<PLAYS, ZONES, T>> {
+        Ok(PlayInverse {
+            dead_zone_thresholds: all_rounded(
+                "dead_zone_thresholds",
+                &self.dead_zone_thresholds,
+                "",
+            )?,
+            dead_zone_weights: all_rounded("dead_zone_weights", &self.dead_zone_weights, "")?,
+            plays: Play {
+                linear: rounded("linear", self.plays.linear, "")?,
+                thresholds: all_rounded("thresholds", &self.plays.thresholds, "")?,
+                weights: all_rounded("weights", &self.plays.weights, "")?,
+                dead_zone_thresholds: [],
+                dead_zone_weights: [],
+            },
+        })
+    }
+}
+
+impl<const PLAYS: usize, const ZONES: usize, T: Real> PlayInverse<PLAYS, ZONES, T> {
+    /// The state of the inverse of an operator at rest.
+    #[must_use]
+    pub fn rest(&self) -> PlayState<T, PLAYS> {
+        self.plays.rest()
+    }
 
     /// Moves the output of the operator to `output` and returns its input (V).
     ///
@@ -94,10 +120,10 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
     /// the state unchanged, where `output` is not finite (or beyond 1e100), or what goes into the
     /// dead zones is not.
     #[inline]
-    pub fn follow(&self, state: &mut PlayState<f64, PLAYS>, output: f64) -> f64 {
+    pub fn follow(&self, state: &mut PlayState<T, PLAYS>, output: T) -> T {
         let before = self.before_dead_zones(output);
-        if !(usable(output) && usable(before)) {
-            return f64::NAN;
+        if !(output.is_usable() && before.is_usable()) {
+            return T::NAN;
         }
         self.plays.follow(state, before)
     }
@@ -106,12 +132,12 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
     /// plays.
     #[must_use]
     #[inline]
-    pub fn before_dead_zones(&self, output: f64) -> f64 {
+    pub fn before_dead_zones(&self, output: T) -> T {
         let mut value = output;
         for (corner, bend) in self.dead_zone_thresholds.iter().zip(&self.dead_zone_weights) {
-            let beyond = output - corner;
-            if beyond > 0.0 {
-                value += bend * beyond;
+            let beyond = output - *corner;
+            if beyond > T::ZERO {
+                value = value + *bend * beyond;
             }
         }
         value
@@ -119,15 +145,15 @@ impl<const PLAYS: usize, const ZONES: usize> PlayInverse<PLAYS, ZONES> {
 }
 
 /// The operator's output is the displacement; velocity and acceleration have no effect.
-impl<const PLAYS: usize, const ZONES: usize> Inverse for PlayInverse<PLAYS, ZONES> {
-    type State = PlayState<f64, PLAYS>;
+impl<const PLAYS: usize, const ZONES: usize, T: Real> Inverse<T> for PlayInverse<PLAYS, ZONES, T> {
+    type State = PlayState<T, PLAYS>;
 
     fn rest(&self) -> Self::State {
         self.rest()
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, x: f64, _v: f64, _a: f64) -> f64 {
+    fn step(&self, state: &mut Self::State, x: T, _v: T, _a: T) -> T {
         self.follow(state, x)
     }
 }

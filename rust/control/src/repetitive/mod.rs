@@ -230,7 +230,7 @@ impl Repetitive {
             used.reverse();
         }
         SampledRepetitive {
-            lengths: Lengths { period: delay, whole: 0, entries: 0 },
+            lengths: Lengths { period: delay, rest: 0.0, whole: 0, entries: 0 },
             pole,
             gain: self.kq * 1e6,
             pause: self.pause,

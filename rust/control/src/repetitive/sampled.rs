@@ -2,25 +2,27 @@
 
 use super::saturation::{Learning, Lengths, Outcome, Saturation};
 use super::{TAPS, count, samples};
+use crate::cast::{Cast, all_rounded, rounded};
 use crate::error::{Error, Result};
+use crate::number::Real;
 use crate::snapshot::Snapshot;
 
 /// Coefficients of a repetitive controller for one sampling interval; see [`Repetitive::at`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SampledRepetitive {
+pub struct SampledRepetitive<T = f64> {
     /// L/Ts and others.
-    pub(super) lengths: Lengths,
+    pub(super) lengths: Lengths<T>,
     /// p, 0 for a filter without memory.
-    pub(super) pole: f64,
+    pub(super) pole: T,
     /// Kq, V/m.
-    pub(super) gain: f64,
+    pub(super) gain: T,
     pub(super) pause: bool,
     /// Number of entries by which an error is stored earlier.
     pub(super) lead: usize,
     /// Delay of the first tap, in samples, 1 or more.
     pub(super) nearest: usize,
     /// Weights of the samples, the oldest first; 0 where not in use.
-    pub(super) taps: [f64; TAPS],
+    pub(super) taps: [T; TAPS],
     /// Number of taps in use.
     pub(super) reads: usize,
     /// Entries of each of the two lines.
@@ -32,19 +34,19 @@ pub struct SampledRepetitive {
 /// Coefficients of a repetitive controller and the lengths of its memory: see
 /// [`SampledRepetitive::recursion`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Recursion<'a> {
+pub struct Recursion<'a, T = f64> {
     /// Period of the reference, in samples.
     pub period: f64,
     /// Pole p of the filter, 0 for a filter without memory.
-    pub pole: f64,
+    pub pole: T,
     /// Learning gain Kq, V/m.
-    pub gain: f64,
+    pub gain: T,
     /// Number of samples by which errors are stored earlier than voltages.
     pub lead: usize,
     /// Delay of the first tap, in samples, more than `lead`.
     pub nearest: usize,
     /// Weights of the samples, the oldest first; the last one has the delay `nearest`.
-    pub taps: &'a [f64],
+    pub taps: &'a [T],
     /// Entries of each of the two lines of the memory.
     pub entries: usize,
     /// Oldest entries of a line that no tap reads.
@@ -57,41 +59,41 @@ pub struct Recursion<'a> {
 
 /// Sum of products in two independent sums, which the processor can compute in parallel.
 #[inline]
-fn weighted(entries: &[f64], taps: &[f64]) -> f64 {
-    let (mut even, mut odd) = (0.0, 0.0);
+fn weighted<T: Real>(entries: &[T], taps: &[T]) -> T {
+    let (mut even, mut odd) = (T::ZERO, T::ZERO);
     let mut pairs = entries.iter().zip(taps);
     while let Some((entry, tap)) = pairs.next() {
-        even += entry * tap;
+        even = even + *entry * *tap;
         if let Some((entry, tap)) = pairs.next() {
-            odd += entry * tap;
+            odd = odd + *entry * *tap;
         }
     }
     even + odd
 }
 
-/// State of a repetitive controller, with a delay line provided by the caller: `&mut [f64]`,
-/// `[f64; N]` or `Vec<f64>`.
+/// State of a repetitive controller, with a delay line provided by the caller: `&mut [T]`,
+/// `[T; N]` or `Vec<T>`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RepetitiveState<L> {
+pub struct RepetitiveState<L, T = f64> {
     /// First what is learnt, uRC + Kq e, then what was put out, uRC: a ring of each.
     line: L,
     /// Index of the next entry to be written.
     next: usize,
     /// The last output, V.
-    volts: f64,
-    saturation: Saturation,
+    volts: T,
+    saturation: Saturation<T>,
 }
 
 /// The line is written with its length, and read into one of the same length.
-impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for RepetitiveState<L> {
+impl<T: Real, L: AsRef<[T]> + AsMut<[T]>> Snapshot for RepetitiveState<L, T> {
     fn save(&self, write: &mut dyn FnMut(f64)) {
         let line = self.line.as_ref();
         length(line).save(write);
         for entry in line {
-            write(*entry);
+            entry.save(write);
         }
         length(line.get(..self.next).unwrap_or_default()).save(write);
-        write(self.volts);
+        self.volts.save(write);
         self.saturation.save(write);
     }
 
@@ -111,7 +113,7 @@ impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for RepetitiveState<L> {
 }
 
 /// A state without a repetitive part must have been one when it was saved too.
-impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for Option<RepetitiveState<L>> {
+impl<T: Real, L: AsRef<[T]> + AsMut<[T]>> Snapshot for Option<RepetitiveState<L, T>> {
     fn save(&self, write: &mut dyn FnMut(f64)) {
         self.is_some().save(write);
         if let Some(memory) = self {
@@ -130,7 +132,7 @@ impl<L: AsRef<[f64]> + AsMut<[f64]>> Snapshot for Option<RepetitiveState<L>> {
 }
 
 /// Number of entries, of which a line has fewer than 2^32.
-fn length(line: &[f64]) -> u32 {
+fn length<T>(line: &[T]) -> u32 {
     u32::try_from(line.len()).unwrap_or(u32::MAX)
 }
 
@@ -141,10 +143,33 @@ impl SampledRepetitive {
         let entries = reach.max(samples(libm::ceil(period - 1e-9)));
         let count = |n| u32::try_from(n).unwrap_or(u32::MAX);
         let whole = count(samples(libm::round(period)).clamp(1, entries));
-        let lengths = Lengths { period, whole, entries: count(entries) };
+        let rest = period - f64::from(whole);
+        let lengths = Lengths { period, rest, whole, entries: count(entries) };
         Self { lengths, entries, unread: entries - reach, ..self }
     }
+}
 
+impl Cast for SampledRepetitive {
+    type In<T: Real> = SampledRepetitive<T>;
+
+    fn cast<T: Real>(&self) -> Result<SampledRepetitive<T>> {
+        let Lengths { period, rest, whole, entries } = self.lengths;
+        Ok(SampledRepetitive {
+            lengths: Lengths { period, rest: rounded("period", rest, "samples")?, whole, entries },
+            pole: rounded("tq", self.pole, "")?,
+            gain: rounded("kq", self.gain, "V/m")?,
+            pause: self.pause,
+            lead: self.lead,
+            nearest: self.nearest,
+            taps: all_rounded("forgetting_factor", &self.taps, "")?,
+            reads: self.reads,
+            entries: self.entries,
+            unread: self.unread,
+        })
+    }
+}
+
+impl<T: Real> SampledRepetitive<T> {
     /// Least number of entries of the delay line.
     #[must_use]
     pub fn length(&self) -> usize {
@@ -160,7 +185,7 @@ impl SampledRepetitive {
     /// Coefficients of the recursion, for a stability analysis or a controller in another language:
     /// `uRC[k] = pole uRC[k-1] + sum of tap (uRC[k-n] + gain e[k-n+lead])`, n the delay of a tap.
     #[must_use]
-    pub fn recursion(&self) -> Recursion<'_> {
+    pub fn recursion(&self) -> Recursion<'_, T> {
         Recursion {
             period: self.lengths.period,
             pole: self.pole,
@@ -179,15 +204,15 @@ impl SampledRepetitive {
     ///
     /// # Errors
     /// Names `line` where it is shorter than [`Self::length`].
-    pub fn rest<L: AsMut<[f64]>>(&self, mut line: L) -> Result<RepetitiveState<L>> {
+    pub fn rest<L: AsMut<[T]>>(&self, mut line: L) -> Result<RepetitiveState<L, T>> {
         let entries = line.as_mut();
         if entries.len() < self.length() {
             let value = count(entries.len());
             let expected = "at least as many as the controller's length()";
             return Err(Error { name: "line", value, unit: "entries", expected });
         }
-        entries.fill(0.0);
-        Ok(RepetitiveState { line, next: 0, volts: 0.0, saturation: Saturation::NONE })
+        entries.fill(T::ZERO);
+        Ok(RepetitiveState { line, next: 0, volts: T::ZERO, saturation: Saturation::NONE })
     }
 
     /// The voltage for this sample, from what came of the sample *before*; within `most` (V) of 0.
@@ -201,20 +226,20 @@ impl SampledRepetitive {
     /// the saturation is repeated unchanged until it ends. Where the repeated voltage itself is
     /// what saturates, as the errors then tell, half of it is forgotten with each period.
     #[inline]
-    pub fn step<L: AsMut<[f64]>>(
+    pub fn step<L: AsMut<[T]>>(
         &self,
-        state: &mut RepetitiveState<L>,
-        before: Outcome,
-        most: f64,
-    ) -> f64 {
-        let clipped = self.pause && before.excess.abs() > 0.0;
+        state: &mut RepetitiveState<L, T>,
+        before: Outcome<T>,
+        most: T,
+    ) -> T {
+        let clipped = self.pause && before.excess.abs() > T::ZERO;
         if clipped || state.saturation.learning != Learning::On {
             return self.step_saturated(state, before, clipped, most);
         }
         state.saturation.pass();
         let RepetitiveState { line, next, volts, .. } = state;
-        let Some(lines) = line.as_mut().get_mut(..2 * self.entries) else { return 0.0 };
-        let error = if before.error.is_finite() { before.error } else { 0.0 };
+        let Some(lines) = line.as_mut().get_mut(..2 * self.entries) else { return T::ZERO };
+        let error = if before.error.is_finite() { before.error } else { T::ZERO };
         self.store(lines, next, [*volts, *volts], self.gain * error);
         *volts = bounded(self.pole * *volts + self.filtered(lines, *next), most);
         *volts
@@ -222,19 +247,19 @@ impl SampledRepetitive {
 
     /// A sample while command or memory are affected by saturation.
     #[inline]
-    fn step_saturated<L: AsMut<[f64]>>(
+    fn step_saturated<L: AsMut<[T]>>(
         &self,
-        state: &mut RepetitiveState<L>,
-        before: Outcome,
+        state: &mut RepetitiveState<L, T>,
+        before: Outcome<T>,
         clipped: bool,
-        most: f64,
-    ) -> f64 {
+        most: T,
+    ) -> T {
         let RepetitiveState { line, next, volts, saturation } = state;
-        let Some(lines) = line.as_mut().get_mut(..2 * self.entries) else { return 0.0 };
+        let Some(lines) = line.as_mut().get_mut(..2 * self.entries) else { return T::ZERO };
         let was_held = matches!(saturation.learning, Learning::Held { .. });
         if saturation.is_latched(before, clipped, &self.lengths) {
             for entry in lines.iter_mut() {
-                *entry *= 0.5;
+                *entry = *entry * T::of(0.5);
             }
         }
         saturation.follow(clipped, &self.lengths);
@@ -242,9 +267,10 @@ impl SampledRepetitive {
             let (sum, learns) = if clipped {
                 // As much of uRC as takes the command to the limit.
                 let used = *volts + before.excess;
-                (used.max(volts.min(0.0)).min(volts.max(0.0)), 0.0)
+                let (least, most) = (volts.smaller(T::ZERO), volts.larger(T::ZERO));
+                (used.larger(least).smaller(most), T::ZERO)
             } else {
-                (*volts, if before.error.is_finite() { self.gain * before.error } else { 0.0 })
+                (*volts, if before.error.is_finite() { self.gain * before.error } else { T::ZERO })
             };
             self.store(lines, next, [sum, *volts], learns);
         }
@@ -261,7 +287,7 @@ impl SampledRepetitive {
     /// Writes an entry of both lines, what is learnt (less the error's part) and what was put out,
     /// and adds `learns` where its error belongs.
     #[inline]
-    fn store(&self, lines: &mut [f64], next: &mut usize, entry: [f64; 2], learns: f64) {
+    fn store(&self, lines: &mut [T], next: &mut usize, entry: [T; 2], learns: T) {
         let entries = self.entries;
         if let Some(given) = lines.get_mut(entries + *next) {
             *given = entry[1];
@@ -271,15 +297,15 @@ impl SampledRepetitive {
         }
         let back = if *next >= self.lead { *next } else { *next + entries };
         if let Some(sum) = lines.get_mut(back - self.lead) {
-            *sum += learns;
+            *sum = *sum + learns;
         }
         *next = if *next + 1 < entries { *next + 1 } else { 0 };
     }
 
     /// The filter Q of what is learnt, without its memory; the entry at `next` is the oldest.
     #[inline]
-    fn filtered(&self, lines: &[f64], next: usize) -> f64 {
-        let Some(learnt) = lines.get(..self.entries) else { return 0.0 };
+    fn filtered(&self, lines: &[T], next: usize) -> T {
+        let Some(learnt) = lines.get(..self.entries) else { return T::ZERO };
         let first = next + self.unread;
         let first = if first < self.entries { first } else { first - self.entries };
         let (newer, older) = learnt.split_at(first.min(learnt.len()));
@@ -289,27 +315,27 @@ impl SampledRepetitive {
     }
 
     /// Clears everything learnt.
-    pub fn reset<L: AsMut<[f64]>>(&self, state: &mut RepetitiveState<L>) {
-        state.line.as_mut().fill(0.0);
+    pub fn reset<L: AsMut<[T]>>(&self, state: &mut RepetitiveState<L, T>) {
+        state.line.as_mut().fill(T::ZERO);
         state.next = 0;
-        state.volts = 0.0;
+        state.volts = T::ZERO;
         state.saturation = Saturation::NONE;
     }
 }
 
 /// A voltage within `most` of 0; 0 V where it is not a number.
 #[inline]
-fn bounded(volts: f64, most: f64) -> f64 {
+fn bounded<T: Real>(volts: T, most: T) -> T {
     if volts.abs() <= most {
         return volts;
     }
-    if volts.is_nan() { 0.0 } else { volts.max(-most).min(most) }
+    if volts.is_nan() { T::ZERO } else { volts.larger(-most).smaller(most) }
 }
 
 /// The entry of a ring that was written `age` samples ago; `next` is the oldest.
 #[inline]
-fn repeated(ring: &[f64], next: usize, age: u32) -> f64 {
+fn repeated<T: Real>(ring: &[T], next: usize, age: u32) -> T {
     let age = age as usize;
     let place = if next >= age { next - age } else { (next + ring.len()).wrapping_sub(age) };
-    ring.get(place).copied().unwrap_or(0.0)
+    ring.get(place).copied().unwrap_or(T::ZERO)
 }

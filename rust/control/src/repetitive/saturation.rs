@@ -1,5 +1,6 @@
 //! Antiwindup of a repetitive controller: when to learn, and when to hold what was learnt.
 
+use crate::number::Real;
 use crate::snapshot::Snapshot;
 
 /// Clipped samples in a period, as its part, above which learning stops as a whole.
@@ -7,11 +8,11 @@ const PART: u32 = 4;
 
 /// Outcome of the command of the sample before: a repetitive part learns from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Outcome {
+pub struct Outcome<T = f64> {
     /// Its tracking error, m.
-    pub error: f64,
+    pub error: T,
     /// Applied voltage less the unclipped command, V; 0 where it was not saturated.
-    pub excess: f64,
+    pub excess: T,
 }
 
 /// Action of the repetitive part in a sample.
@@ -57,9 +58,11 @@ impl Snapshot for Learning {
 
 /// Lengths of a repetitive controller that its antiwindup uses, in samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Lengths {
+pub(super) struct Lengths<T = f64> {
     /// L/Ts.
     pub(super) period: f64,
+    /// By how much that is more than a whole number.
+    pub(super) rest: T,
     /// The same as a whole number.
     pub(super) whole: u32,
     /// Entries of each line.
@@ -68,7 +71,7 @@ pub(super) struct Lengths {
 
 /// Counts clipped samples, and decides what the repetitive part does.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Saturation {
+pub(super) struct Saturation<T = f64> {
     pub(super) learning: Learning,
     /// Samples since the first clipped one of the count; more than a period where none counts.
     since: u32,
@@ -79,19 +82,19 @@ pub(super) struct Saturation {
     /// Held periods with few clipped samples, one after the other.
     well: u32,
     /// Time by which the held periods are shorter than those of the reference, in samples.
-    behind: f64,
+    behind: T,
 }
 
-crate::snapshot!(Saturation { learning, since, clipped, inward, well, behind });
+crate::snapshot!([T: Real] Saturation<T> { learning, since, clipped, inward, well, behind });
 
-impl Saturation {
+impl<T: Real> Saturation<T> {
     pub(super) const NONE: Self = Self {
         learning: Learning::On,
         since: u32::MAX,
         clipped: 0,
         inward: 0,
         well: 0,
-        behind: 0.0,
+        behind: T::ZERO,
     };
 
     /// Continues with the next sample where nothing was clipped and learning is on.
@@ -105,7 +108,7 @@ impl Saturation {
     /// What was learnt is held for a whole number of periods, to the nearest sample, so that it is
     /// in phase with the reference afterwards.
     #[inline]
-    pub(super) fn follow(&mut self, clipped: bool, lengths: &Lengths) {
+    pub(super) fn follow(&mut self, clipped: bool, lengths: &Lengths<T>) {
         self.learning = match self.learning {
             Learning::Held { left } => return self.hold(left.saturating_sub(1), clipped, lengths),
             Learning::Resuming { left } if left > 1 => Learning::Resuming { left: left - 1 },
@@ -118,7 +121,7 @@ impl Saturation {
         self.clipped = self.clipped.saturating_add(u32::from(clipped));
         if clipped && self.clipped > lengths.whole / PART {
             (self.since, self.clipped, self.inward) = (u32::MAX, 0, 0);
-            self.behind = 0.0;
+            self.behind = T::ZERO;
             self.learning = self.another(lengths);
         }
     }
@@ -126,7 +129,7 @@ impl Saturation {
     /// Continues in a held period. At its end, holds for another one: where too much was clipped,
     /// and once more after that, so that the feedback has settled before it learns again.
     #[inline]
-    fn hold(&mut self, left: u32, clipped: bool, lengths: &Lengths) {
+    fn hold(&mut self, left: u32, clipped: bool, lengths: &Lengths<T>) {
         self.clipped = self.clipped.saturating_add(u32::from(clipped));
         self.learning = Learning::Held { left };
         if left > 0 {
@@ -148,20 +151,26 @@ impl Saturation {
     /// of a period that was clipped by what is held and not by the reference: most of what was
     /// clipped would have been brought back by its errors, and would stay clipped for ever.
     #[inline]
-    pub(super) fn is_latched(&mut self, before: Outcome, clipped: bool, lengths: &Lengths) -> bool {
+    pub(super) fn is_latched(
+        &mut self,
+        before: Outcome<T>,
+        clipped: bool,
+        lengths: &Lengths<T>,
+    ) -> bool {
         let Learning::Held { left } = self.learning else { return false };
-        self.inward += u32::from(clipped && before.excess * before.error > 0.0);
+        self.inward += u32::from(clipped && before.excess * before.error > T::ZERO);
         left <= 1 && self.inward > lengths.whole / PART && self.inward > self.clipped / 2
     }
 
     /// Another held period, of as many samples as keeps it in phase.
-    fn another(&mut self, lengths: &Lengths) -> Learning {
-        self.behind += lengths.period - f64::from(lengths.whole);
+    fn another(&mut self, lengths: &Lengths<T>) -> Learning {
+        self.behind = self.behind + lengths.rest;
         let mut left = lengths.whole;
-        if self.behind > 0.5 && left < lengths.entries {
-            (self.behind, left) = (self.behind - 1.0, left + 1);
-        } else if self.behind < -0.5 && left > 1 {
-            (self.behind, left) = (self.behind + 1.0, left - 1);
+        let (one, half) = (T::of(1.0), T::of(0.5));
+        if self.behind > half && left < lengths.entries {
+            (self.behind, left) = (self.behind - one, left + 1);
+        } else if self.behind < -half && left > 1 {
+            (self.behind, left) = (self.behind + one, left - 1);
         }
         Learning::Held { left }
     }

@@ -87,10 +87,17 @@ impl<S: Simd, const K: usize> Neg for Lanes<S, K> {
 }
 
 impl<S: Simd, const K: usize> Number for Lanes<S, K> {
+    type Lane = f64;
+
     #[inline(always)]
     fn like(mut self, value: f64) -> Self {
         self.vectors = [self.simd.splat_f64s(value); K];
         self
+    }
+
+    #[inline(always)]
+    fn each(self, value: f64) -> Self {
+        self.like(value)
     }
 
     #[inline(always)]

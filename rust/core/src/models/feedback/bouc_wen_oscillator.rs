@@ -8,9 +8,9 @@
 //! Noel and Schoukens 2016, "Hysteretic benchmark with a dynamic nonlinearity", equations (1)
 //! and (3), doi 10.4121/12967592. The drive u is a force.
 
-use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Operator};
 use piezotrack_control::inverse::OscillatorInverse;
+use piezotrack_control::{Number, Real};
 
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Result, finite, not_zero, within};
@@ -219,7 +219,12 @@ impl BoucWenOscillatorKernel {
     #[inline(always)]
     fn operator<N: Number>(self, parameters: &Parameters<N>) -> BoucWen<N> {
         let [_, _, _, rise, beta, gamma, delta, ..] = *parameters;
-        BoucWen { rise, beta: beta * gamma, gamma: beta * delta, exponent: self.exponent }
+        BoucWen {
+            rise,
+            beta: beta * gamma,
+            gamma: beta * delta,
+            exponent: N::Lane::of(self.exponent),
+        }
     }
 }
 

@@ -9,9 +9,9 @@
 //! the second-order form of [`crate::models::dahl::DahlStage`] the operator is bounded and dissipative, and
 //! its loops close.
 
-use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWenState, FirstOrderDahl, Operator};
 use piezotrack_control::inverse::FirstOrderDahlInverse;
+use piezotrack_control::{Number, Real};
 
 use crate::design::{Gains, LoopPlant};
 use crate::error::{Result, not_negative, not_zero, positive, within};
@@ -202,7 +202,7 @@ impl FirstOrderDahlKernel {
     #[inline(always)]
     fn operator<N: Number>(self, parameters: &Parameters<N>) -> FirstOrderDahl<N> {
         let [_, _, _, _, rest_stiffness, coulomb_force, ..] = *parameters;
-        FirstOrderDahl { rest_stiffness, coulomb_force, exponent: self.exponent }
+        FirstOrderDahl { rest_stiffness, coulomb_force, exponent: N::Lane::of(self.exponent) }
     }
 }
 

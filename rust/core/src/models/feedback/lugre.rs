@@ -10,9 +10,9 @@
 //! [`super::first_order_dahl::FirstOrderDahlStage`] with exponent 1. Displacement and drive determine the sum of D and
 //! sigma2 only.
 
-use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWenState, FirstOrderDahl, LuGre, Operator};
 use piezotrack_control::inverse::LuGreInverse;
+use piezotrack_control::{Number, Real};
 
 use super::first_order_dahl::plants_with_friction;
 use crate::design::LoopPlant;
@@ -128,7 +128,7 @@ impl LuGreStage {
 #[inline(always)]
 fn slow<N: Number>(friction: &LuGre<N>) -> FirstOrderDahl<N> {
     let LuGre { rest_stiffness, static_force, .. } = *friction;
-    FirstOrderDahl { rest_stiffness, coulomb_force: static_force, exponent: 1.0 }
+    FirstOrderDahl { rest_stiffness, coulomb_force: static_force, exponent: N::Lane::of(1.0) }
 }
 
 impl KernelModel for LuGreStage {

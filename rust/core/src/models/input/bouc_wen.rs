@@ -7,9 +7,9 @@
 //!
 //! Xu and Li 2010, equations (19) and (20), doi 10.1115/1.4001712.
 
-use piezotrack_control::Number;
 use piezotrack_control::hysteresis::{BoucWen, BoucWenState, Operator};
 use piezotrack_control::inverse::BoucWenInverse;
+use piezotrack_control::{Number, Real};
 
 use super::input_kernel::{InputHysteresis, InputKernel, plants_with_input};
 use crate::design::LoopPlant;
@@ -223,6 +223,6 @@ impl InputHysteresis for BoucWenHysteresis {
     #[inline(always)]
     fn operator<N: Number>(&self, parameters: &Parameters<N>) -> BoucWen<N> {
         let [_, _, _, gain, alpha, beta, gamma, ..] = *parameters;
-        BoucWen { rise: alpha * gain, beta, gamma, exponent: self.exponent }
+        BoucWen { rise: alpha * gain, beta, gamma, exponent: N::Lane::of(self.exponent) }
     }
 }
