@@ -2,13 +2,14 @@
 # _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
 from .approximation import MultiAxisResponse as MultiAxisResponse
 from .approximation import approximate_axes as approximate_axes
-from .closed_loop import AxesMargins as AxesMargins
-from .closed_loop import MultiAxisTracking as MultiAxisTracking
-from .closed_loop import check_axes as check_axes
-from .closed_loop import track_axes as track_axes
-from .decoupling import decoupling_matrix as decoupling_matrix
-from .decoupling import repeating_drive as repeating_drive
+from .distortion import Regressors as Regressors
 from .identify import identify_axes as identify_axes
+from .loop.closed_loop import AxesMargins as AxesMargins
+from .loop.closed_loop import MultiAxisTracking as MultiAxisTracking
+from .loop.closed_loop import check_axes as check_axes
+from .loop.closed_loop import track_axes as track_axes
+from .loop.decoupling import decoupling_matrix as decoupling_matrix
+from .loop.decoupling import repeating_drive as repeating_drive
 from .modal_model import AxesLevel as AxesLevel
 from .modal_model import MultiAxisModel as MultiAxisModel
 from .modal_model import MultiAxisMotion as MultiAxisMotion

@@ -1,5 +1,5 @@
 //! Distortion of modes: pairs of a mode and an input that made a residual are found again.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::cast_precision_loss)]
 
 use std::f64::consts::PI;
 

@@ -14,7 +14,7 @@ from .loop_options import MOST_SENSITIVITY, PAPER
 
 if TYPE_CHECKING:
     from ...control.laws.pid import Pid
-    from ...multiaxis.closed_loop import MultiAxisTracking
+    from ...multiaxis.loop.closed_loop import MultiAxisTracking
     from ...multiaxis.modal_model import MultiAxisModel
     from ..option_groups import Motion
     from ..output import Output
@@ -46,7 +46,7 @@ def axes_in(file: Path) -> MultiAxisModel | None:
 
 def refuse_several_references(text: str) -> None:
     """Refuse references of several axes for a model of one."""
-    from ...multiaxis.references import BETWEEN
+    from ...multiaxis.loop.references import BETWEEN
 
     if BETWEEN in text and not Path(text).is_file():
         count = len(text.split(BETWEEN))
@@ -69,8 +69,8 @@ def track_several(
 ) -> None:
     """Track references of several axes, with the diagonal of the gains and with all of them."""
     from ..._support.files.writing import picture_files
-    from ...multiaxis.closed_loop import check_axes, track_axes
-    from ...multiaxis.references import sampled_references
+    from ...multiaxis.loop.closed_loop import check_axes, track_axes
+    from ...multiaxis.loop.references import sampled_references
 
     others = [one.name for one in click.get_current_context().command.params if one.name]
     refuse_without_effect([name for name in others if name not in ACTING], "with several axes")

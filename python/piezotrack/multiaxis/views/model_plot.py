@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-    from ..closed_loop import MultiAxisTracking
+    from ..loop.closed_loop import MultiAxisTracking
     from ..modal_model import MultiAxisModel
 
 __all__ = ["plot_model", "plot_tracking"]

@@ -9,7 +9,7 @@ import numpy as np
 from ..._support.units import drive_text, shown_unit
 
 if TYPE_CHECKING:
-    from ..closed_loop import MultiAxisTracking
+    from ..loop.closed_loop import MultiAxisTracking
     from ..modal_model import AxesLevel, MultiAxisModel
 
 __all__ = ["axes_tracking_text", "model_text"]

@@ -7,9 +7,8 @@
 mod amplifier;
 mod apparatus;
 mod closed_loop;
-mod modal_system;
+mod modes;
 mod open_loop;
-mod regressors;
 mod sensor;
 mod sensor_delay;
 mod timing;
@@ -21,11 +20,10 @@ mod virtual_stage;
 pub use amplifier::{Amplifier, AmplifierFlow};
 pub use apparatus::{Apparatus, ApparatusState};
 pub use closed_loop::{ClosedLoop, closed_loop};
-pub use modal_system::{AxesLoop, AxesRun, ModalState, ModalSystem};
-
-pub(crate) use modal_system::check_modes;
+pub use modes::{
+    AxesLoop, AxesRun, ModalState, ModalSystem, Regressor, RegressorState, Regressors,
+};
 pub use open_loop::{OpenLoop, open_loop};
-pub use regressors::{Regressor, RegressorState, Regressors};
 pub use sensor::{Sensor, SensorState};
 pub use timing::{MissedTicks, Timing};
 pub use tracking::{DELAY_LINE, ReferenceSamples, TrackingRun, track};
@@ -35,4 +33,5 @@ pub use two_axes::{
 pub use virtual_run::VirtualRun;
 pub use virtual_stage::{Preconditioning, VirtualStage};
 
+pub(crate) use modes::check_modes;
 pub(crate) use timing::{Delay, SAME};

@@ -47,6 +47,7 @@ impl PyRegressors {
     /// The regressors along drives and displacements from a state, at rest by default, and the
     /// state after them.
     #[pyo3(signature = (drives, displacements, state = None))]
+    #[expect(clippy::needless_pass_by_value, reason = "extracted from Python")]
     fn follow<'py>(
         &self,
         py: Python<'py>,

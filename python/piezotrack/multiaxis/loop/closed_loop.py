@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from .. import _core
-from .._support.arguments import expect, has_entries, not_negative, number_pair, one_of
-from .._support.arrays import real_array
-from .._support.display.result import Result
-from .._support.files.writing import write_result
-from .._support.statistics import ErrorStatistics
-from ..control.laws.pid import Pid
-from ..errors import ParameterError, ShapeError
+from ... import _core
+from ..._support.arguments import expect, has_entries, not_negative, number_pair, one_of
+from ..._support.arrays import real_array
+from ..._support.display.result import Result
+from ..._support.files.writing import write_result
+from ..._support.statistics import ErrorStatistics
+from ...control.laws.pid import Pid
+from ...errors import ParameterError, ShapeError
+from ..modal_model import MultiAxisModel
+from ..virtual import VirtualAxes
 from .decoupling import decoupling_matrix, reference_of, terms_of
-from .modal_model import MultiAxisModel
 from .references import sampled_references
-from .virtual import VirtualAxes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from .modal_terms import ModalTerms
+    from ..modal_terms import ModalTerms
 
     Array = NDArray[np.float64]
     Complex = NDArray[np.complex128]

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .._support.units import lookup
-from ..data.columns import TO_FOLLOW
-from ..data.reader import Log
-from ..errors import PiezotrackError, ShapeError
-from ..references.parse import PATHS, parse_path, reference_of
-from ..references.reference import read_reference
+from ..._support.units import lookup
+from ...data.columns import TO_FOLLOW
+from ...data.reader import Log
+from ...errors import PiezotrackError, ShapeError
+from ...references.parse import PATHS, parse_path, reference_of
+from ...references.reference import read_reference
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..references.reference import Reference
+    from ...references.reference import Reference
 
     Array = NDArray[np.float64]
 

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import _core
-from .._support.arguments import expect, in_range, one_of, positive
-from .._support.arrays import real_array
-from ..errors import DataError, NumericalError, ShapeError
-from .modal_model import MultiAxisModel
-from .virtual import VirtualAxes
+from ... import _core
+from ..._support.arguments import expect, in_range, one_of, positive
+from ..._support.arrays import real_array
+from ...errors import DataError, NumericalError, ShapeError
+from ..modal_model import MultiAxisModel
+from ..virtual import VirtualAxes
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from .modal_terms import ModalTerms
+    from ..modal_terms import ModalTerms
 
     Array = NDArray[np.float64]
 

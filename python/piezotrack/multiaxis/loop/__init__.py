@@ -1,0 +1,1 @@
+"""Decoupling of several axes, loops around them, and their references."""
