@@ -69,7 +69,7 @@ def load_axes(path: str | os.PathLike[str]) -> MultiAxisModel:
             raise ParameterError("levels", quoted(sizes), "rising numbers above 0")
         return MultiAxisModel(
             levels=levels,
-            regressors=_regressors(document["regressors"], levels),
+            regressors=_regressors(document.get("regressors", {}), levels),
             dt=_core.as_number("dt_s", document["dt_s"]),
             drive_unit=document["drive_unit"],
             output_unit=document["output_unit"],
@@ -88,7 +88,8 @@ def _level(entry: dict[str, Any]) -> AxesLevel:
             raise ShapeError(
                 name, f"the shape {getattr(terms, name).shape}", f"{poles.size} x {width}"
             )
-    if entry["forces_real"]:
+    # Files of models without distortion have none of its entries.
+    if entry.get("forces_real"):
         forces = _complex(entry, "forces", 2)
         if forces.shape[0] != poles.size:
             raise ShapeError("forces", f"{forces.shape[0]} rows", f"{poles.size}")
@@ -105,7 +106,7 @@ def _level(entry: dict[str, Any]) -> AxesLevel:
         angle_sd=_sized(_array(entry, "angle_sd_rad", 1), "angle_sd_rad", poles.size),
         misfit=_core.as_number("misfit", entry["misfit"]),
         expected=_core.as_number("expected_misfit", entry["expected_misfit"]),
-        distorted=_core.as_number("distorted", entry["distorted"]),
+        distorted=_core.as_number("distorted", entry.get("distorted", 1.0)),
         **means,
     )
 
@@ -114,10 +115,11 @@ def _regressors(entry: dict[str, Any], levels: tuple[AxesLevel, ...]) -> Regress
     """Return the regressors that the forces of all levels belong to."""
     numbers = {
         name: tuple((_core.as_count(name, k), _core.as_number(name, size)) for k, size in rows)
-        for name, rows in (("stops", entry["stops"]), ("changes", entry["changes"]))
+        for name, rows in ((name, entry.get(name, [])) for name in ("stops", "changes"))
     }
     products = tuple(
-        tuple(_core.as_count("products", k) for k in variables) for variables in entry["products"]
+        tuple(_core.as_count("products", k) for k in variables)
+        for variables in entry.get("products", [])
     )
     found = Regressors(products, **numbers)
     drives = levels[0].terms.direct.shape[1]
