@@ -129,16 +129,26 @@ def test_independent_sums_give_the_distorted_motion(model: MultiAxisModel) -> No
 
 
 def test_the_file_holds_the_distortion(model: MultiAxisModel, tmp_path: Path) -> None:
-    again = load_axes(model.save(tmp_path)[1])
+    whole = tmp_path / "axes.json"
+    whole.write_text(json.dumps(model.document()))
+    again = load_axes(whole)
     assert again.regressors == model.regressors
     u = record(1.0, 2, count=1).u[:, :, 0, 0]
     np.testing.assert_array_equal(again.simulate(u).y, model.simulate(u).y)
-    for entry, wrong in (("products", [[0, 9]]), ("stops", [[0, -1.0]]), ("changes", [])):
+    for entry, wrong in (
+        ("products", [[0, 9]]),
+        ("products", 3),
+        ("products", [[-1]]),
+        ("stops", [[0, -1.0]]),
+        ("stops", [[0]]),
+        ("changes", []),
+        ("changes", "none"),
+    ):
         broken = model.document()
         broken["regressors"][entry] = wrong
         path = tmp_path / "broken.json"
         path.write_text(json.dumps(broken))
-        with pytest.raises(pt.PiezotrackError):
+        with pytest.raises(pt.DataError, match=r"broken\.json"):
             load_axes(path)
 
 

@@ -114,8 +114,8 @@ def _level(entry: dict[str, Any]) -> AxesLevel:
 def _regressors(entry: dict[str, Any], levels: tuple[AxesLevel, ...]) -> Regressors:
     """Return the regressors that the forces of all levels belong to."""
     numbers = {
-        name: tuple((_core.as_count(name, k), _core.as_number(name, size)) for k, size in rows)
-        for name, rows in ((name, entry.get(name, [])) for name in ("stops", "changes"))
+        name: tuple(_sized_variable(name, row) for row in entry.get(name, []))
+        for name in ("stops", "changes")
     }
     products = tuple(
         tuple(_core.as_count("products", k) for k in variables)
@@ -129,6 +129,13 @@ def _regressors(entry: dict[str, Any], levels: tuple[AxesLevel, ...]) -> Regress
             raise ShapeError("forces", f"{one.terms.forces.shape[1]} columns", f"{expected}")
     found.core(levels[0].terms, levels[0].level)
     return found
+
+
+def _sized_variable(name: str, row: object) -> tuple[int, float]:
+    """Return a variable and its threshold or scale."""
+    if not isinstance(row, list) or len(row) != 2:
+        raise ParameterError(name, quoted(row), "pairs of a variable and a number", verb="has")
+    return _core.as_count(name, row[0]), _core.as_number(name, row[1])
 
 
 def _complex(entry: dict[str, Any], name: str, dimensions: int) -> NDArray[np.complex128]:

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 
 use piezotrack_core::identify::{DistortionRecord, ModalTerms, choose_distortion};
 use piezotrack_core::signal::NEVER;
+use piezotrack_core::simulate::{Regressor, Regressors};
 use proptest::prelude::Rng;
 use proptest::test_runner::{RngAlgorithm, TestRng};
 
@@ -109,4 +110,11 @@ fn noise_alone_gives_no_pair() {
     assert!(choose_distortion(&[record], 1, NEVER).unwrap().pairs.is_empty());
     let short = DistortionRecord { weights: &weights[1..], ..record };
     assert!(choose_distortion(&[short], 1, NEVER).is_err());
+    assert!(choose_distortion(&[record], INPUTS + 1, NEVER).is_err());
+    let none = vec![f64::NAN; weights.len()];
+    let lost = DistortionRecord { weights: &none, ..record };
+    assert!(choose_distortion(&[lost], 1, NEVER).is_err());
+    assert!(Regressors::new([1, 0], &[1.0], vec![]).is_err());
+    assert!(Regressors::new([1, 1], &[1.0; 3], vec![]).is_err());
+    assert!(Regressors::new([1, 1], &[1.0; 2], vec![Regressor::Product(vec![1])]).is_err());
 }

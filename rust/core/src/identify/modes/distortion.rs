@@ -53,7 +53,7 @@ impl DistortionRecord<'_> {
     }
 
     /// Number of inputs, where all lists fit each other.
-    fn checked(&self) -> Result<usize> {
+    fn checked(&self, drives: usize) -> Result<usize> {
         let (lines, sensors) = (self.angles.len(), self.terms.sensors);
         let realisations = self.realisations();
         let inputs = self.inputs.len() / (lines * realisations).max(1);
@@ -71,8 +71,12 @@ impl DistortionRecord<'_> {
                 });
             }
         }
-        if self.residual.iter().chain(self.inputs).flatten().any(|value| !value.is_finite()) {
-            return Err(Error::parameter("inputs or residual", "NaN", "finite numbers"));
+        let numbers = self.residual.iter().chain(self.inputs).flatten().chain(self.weights);
+        if let Some(value) = numbers.into_iter().find(|value| !value.is_finite()) {
+            return Err(Error::parameter("inputs, residual or weights", value, "finite numbers"));
+        }
+        if drives > inputs {
+            return Err(Error::parameter("drives", drives, format!("{inputs} at most")));
         }
         Ok(inputs)
     }
@@ -157,7 +161,7 @@ struct Level {
 
 impl Level {
     fn new(record: &DistortionRecord<'_>, drives: usize, stop: Stop<'_>) -> Result<Self> {
-        let inputs = record.checked()?;
+        let inputs = record.checked(drives)?;
         let modes = record.terms.poles.len();
         let columns = 2 * modes;
         let count = columns * inputs;

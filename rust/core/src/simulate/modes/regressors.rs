@@ -66,9 +66,15 @@ impl Regressors {
         matrix: &[f64],
         list: Vec<Regressor>,
     ) -> Result<Self> {
-        let channels = drives.saturating_add(sensors).max(1);
-        sized("matrix", matrix.len() % channels, 0)?;
-        let count = matrix.len() / channels;
+        if drives == 0 || sensors == 0 {
+            let expected = "a drive and a sensor or more";
+            return Err(Error::parameter(
+                "drives, sensors",
+                format!("{drives}, {sensors}"),
+                expected,
+            ));
+        }
+        let count = whole_samples("matrix", matrix.len(), drives.saturating_add(sensors))?;
         if let Some(value) = matrix.iter().find(|value| !value.is_finite()) {
             return Err(Error::parameter("matrix", value, "finite numbers"));
         }
@@ -102,7 +108,7 @@ impl Regressors {
     /// # Errors
     /// [`Error::Memory`].
     pub fn rest(&self) -> Result<RegressorState> {
-        let count = self.matrix.len() / (self.drives + self.sensors).max(1);
+        let count = self.matrix.len() / (self.drives + self.sensors);
         Ok(RegressorState {
             last: zeros("the variables", count)?,
             values: zeros("the regressors", self.list.len())?,
