@@ -64,4 +64,4 @@ def test_each_kind_of_device_has_an_extra_and_what_imports_nothing_installs_noth
     # A virtual stage is no device that one buys.
     devices = {*schemes(), "epics"} - {"virtual"}
     assert devices <= extras.keys()
-    assert {name for name in devices if not extras[name]} == {"gcs", "scpi", "firmware"}
+    assert {name for name in devices if not extras[name]} == {"gcs", "scpi"}

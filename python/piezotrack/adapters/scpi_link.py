@@ -1,4 +1,4 @@
-"""Messages and answers of an instrument over TCP: one line each."""
+"""Messages and answers of an instrument over TCP or a serial port: one line each."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from .._support.messages import quoted
 from .._support.units import Unit, lookup
 from ..errors import DeviceError
 from .answers import number, shown
+from .serial_port import SerialPort
 
 __all__ = ["Link", "number_of"]
 
@@ -20,26 +21,28 @@ _ANSWER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s.+-]
 
 
 class Link:
-    """A TCP connection that asks and tells in lines, with a time limit.
+    """A connection that asks and tells in lines, with a time limit.
 
-    A message leaves in one segment, without Nagle's algorithm. After a failure the connection is
-    given up, and the next message makes a new one: an answer that comes late is never taken for
-    that of the next message.
+    Over TCP a message leaves in one segment, without Nagle's algorithm. After a failure the
+    connection is given up, and the next message makes a new one: an answer that comes late is never
+    taken for that of the next message.
 
     Parameters
     ----------
     host : str
-        Name or address.
+        Name or address, or the name of a serial port.
     port : int
         TCP port.
     timeout : float
         Time limit of an answer [s].
+    baud : int, optional
+        Rate of a serial port [bit/s].
     """
 
-    def __init__(self, host: str, port: int, timeout: float) -> None:
-        self._host, self._port, self._timeout = host, port, timeout
-        self.where = f"{host}:{port}"
-        self._socket: socket.socket | None = None
+    def __init__(self, host: str, port: int, timeout: float, *, baud: int | None = None) -> None:
+        self._host, self._port, self._timeout, self._baud = host, port, timeout, baud
+        self.where = f"{host}:{port}" if baud is None else host
+        self._socket: socket.socket | SerialPort | None = None
         self._open()
 
     def tell(self, message: str) -> None:
@@ -73,7 +76,9 @@ class Link:
             self.close()
             raise
 
-    def _answer(self, link: socket.socket, message: str, limit: float, longest: int) -> str:
+    def _answer(
+        self, link: socket.socket | SerialPort, message: str, limit: float, longest: int
+    ) -> str:
         parts: list[bytes] = []
         end, length = time.monotonic() + limit, 0
         while True:
@@ -107,7 +112,17 @@ class Link:
         if link is not None:
             link.close()
 
-    def _open(self) -> socket.socket:
+    def _open(self) -> socket.socket | SerialPort:
+        if self._baud is not None:
+            try:
+                port = SerialPort(self._host, self._baud, self._timeout)
+            except OSError as error:
+                raise DeviceError(
+                    f"{self._host} cannot be used: {error}; expected a serial port that no other "
+                    "program has"
+                ) from None
+            self._socket = port
+            return port
         try:
             link = socket.create_connection((self._host, self._port), timeout=self._timeout)
         except OSError as error:
@@ -120,7 +135,7 @@ class Link:
         self._socket = link
         return link
 
-    def _ready(self) -> socket.socket:
+    def _ready(self) -> socket.socket | SerialPort:
         """Return the connection, a new one where the last was given up; nothing waits in it."""
         if self._socket is None:
             return self._open()
@@ -140,7 +155,7 @@ class Link:
         # It closed the connection while nothing was asked.
         return self._open()
 
-    def _send(self, link: socket.socket, message: str) -> None:
+    def _send(self, link: socket.socket | SerialPort, message: str) -> None:
         try:
             link.settimeout(self._timeout)
             link.sendall(message.encode("ascii") + b"\n")

@@ -41,7 +41,8 @@ def connect(address: str) -> Device:
         axis 1 where they are not given; ``?limits=0..100V``, ``factor=1V`` and ``timeout=5s`` as
         of `GcsDevice`; ``ni:Dev1/ao0,Dev1/ai0?scale=10um/V&limits=0..7.5V`` as
         `NiDevice`; ``scpi://HOST:PORT?unit=um&limits=0..75V`` as `ScpiDevice`;
-        ``firmware://HOST[:PORT]``, port 5555 where it is not given, as `FirmwareDevice`.
+        ``firmware://HOST[:PORT]``, port 5555 where it is not given, or
+        ``firmware:///dev/PORT[?baud=115200]``, as `FirmwareDevice`.
 
     Returns
     -------

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ... import _core
 from ..._support.arguments import expect, finite, not_negative, positive
 from ..._support.arrays import signal_of
 from ...control.controller.controller import Controller
@@ -37,14 +38,14 @@ if TYPE_CHECKING:
 
 __all__ = ["FirmwareDevice"]
 
-FORM = "firmware://HOST:PORT[?timeout=5s]"
-PORT, TIMEOUT = 5555, 5.0
+FORM = "firmware://HOST:PORT[?timeout=5s], or firmware:///dev/PORT[?baud=115200]"
+PORT, TIMEOUT, BAUD = 5555, 5.0, 115200
 # Flags of a sample, as in ring.h.
 SATURATED = 1
 
 
 class FirmwareDevice:
-    """A board with the firmware that `control.export_controller` writes, over TCP.
+    """A board with the firmware that `control.export_controller` writes, over TCP or a serial port.
 
     Tables are played, and loops are closed, on the clock of the board. While it is connected, a
     thread gives signs of life: without them for a second the board leads its output to the safe
@@ -53,11 +54,13 @@ class FirmwareDevice:
     Parameters
     ----------
     host : str
-        Name or address; of a serial port that of a program that passes it on, as ``ser2net``.
+        Name or address; of a serial port its name, as ``/dev/ttyACM0`` or ``COM3``.
     port : int, optional
         TCP port.
     timeout : float, optional
         Time limit of an answer [s].
+    baud : int, optional
+        Rate of a serial port [bit/s], of which those over USB take no notice; TCP without it.
 
     Raises
     ------
@@ -65,8 +68,12 @@ class FirmwareDevice:
         Nobody answers there, or no firmware of this version.
     """
 
-    def __init__(self, host: str, port: int = PORT, *, timeout: float = TIMEOUT) -> None:
-        self._line = BoardLine(host, port, positive("timeout", timeout, "s"))
+    def __init__(
+        self, host: str, port: int = PORT, *, timeout: float = TIMEOUT, baud: int | None = None
+    ) -> None:
+        if baud is not None:
+            baud = _core.as_count("baud", baud)
+        self._line = BoardLine(host, port, positive("timeout", timeout, "s"), baud)
         self.board = self._line.board
 
     @property
@@ -347,10 +354,14 @@ class FirmwareDevice:
 def from_address(
     host: str | None, port: int | None, path: str, options: Mapping[str, str]
 ) -> FirmwareDevice:
-    """Connect to ``firmware://HOST:PORT``."""
-    if not host or path.strip("/"):
-        raise ParameterError("device", "no host", FORM, verb="has")
+    """Connect to ``firmware://HOST:PORT``, ``firmware:///dev/PORT`` or ``firmware://COM3?baud=``."""
     given = Options(FORM, options)
     timeout = given.value("timeout", "time", TIMEOUT)
+    serial = not host and bool(path.strip("/"))
+    baud = given.count("baud", BAUD if serial else 0) or None
     given.done()
-    return FirmwareDevice(host, PORT if port is None else port, timeout=timeout)
+    if serial:
+        return FirmwareDevice(path, timeout=timeout, baud=baud)
+    if not host or path.strip("/"):
+        raise ParameterError("device", "no host", FORM, verb="has")
+    return FirmwareDevice(host, PORT if port is None else port, timeout=timeout, baud=baud)

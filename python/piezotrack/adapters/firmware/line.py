@@ -107,11 +107,13 @@ class BoardLine:
     Parameters
     ----------
     host : str
-        Name or address.
+        Name or address, or the name of a serial port.
     port : int
         TCP port.
     timeout : float
         Time limit of an answer [s].
+    baud : int or None
+        Rate of a serial port [bit/s]; None over TCP.
 
     Raises
     ------
@@ -119,8 +121,8 @@ class BoardLine:
         Nobody answers there, or no firmware of this version.
     """
 
-    def __init__(self, host: str, port: int, timeout: float) -> None:
-        self._link = Link(host, port, timeout)
+    def __init__(self, host: str, port: int, timeout: float, baud: int | None) -> None:
+        self._link = Link(host, port, timeout, baud=baud)
         self._lock, self._closed = threading.Lock(), threading.Event()
         try:
             self.board = self._identified(self.ask("id"))
