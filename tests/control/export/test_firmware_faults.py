@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import select
 import socket
 import struct
 import threading
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from boards import booted, connected, controller, within
+from boards import MACHINES, booted, connected, controller, needs_cross, within
 from c_exports import needs_gcc
 
 if TYPE_CHECKING:
@@ -33,6 +34,9 @@ class Clock:
         self.address: tuple[str, int] = self._socket.getsockname()[:2]
         self.status, self.volts, self.going = 0, [math.nan], True
         self.code = 2**19
+        # How long an answer may take before the board begins anew [s]; None: for ever.
+        self.patience: float | None = None
+        self.begun = 0
         self._thread = threading.Thread(target=self._run)
 
     def __enter__(self) -> Clock:
@@ -48,11 +52,18 @@ class Clock:
         link, _ = self._socket.accept()
         with link:
             link.recv(1 + 7 * 8, socket.MSG_WAITALL)
+            self.begun += 1
             while True:
                 while not self.going:
                     time.sleep(0.001)
                 try:
                     link.sendall(struct.pack("<IB", self.code, self.status))
+                    ready, _, _ = select.select([link], [], [], self.patience)
+                    if not ready:
+                        # A board that starts says how codes are meant.
+                        link.recv(1 + 7 * 8, socket.MSG_WAITALL)
+                        self.begun += 1
+                        continue
                     answer = link.recv(4, socket.MSG_WAITALL)
                 except OSError:
                     return
@@ -110,6 +121,30 @@ def test_samples_that_do_not_come_are_a_fault(tmp_path: Path) -> None:
         assert device.voltage == SAFE
         clock.going = True
         assert within(lambda: clock.volts[-1] == SAFE)
+        device.close()
+
+
+@needs_cross
+@pytest.mark.slow
+@pytest.mark.parametrize("board", MACHINES)
+def test_the_watchdog_resets_a_processor_that_hangs(board: str, tmp_path: Path) -> None:
+    one = controller()
+    pt.control.export_controller(one, tmp_path, to="firmware", name="axis")
+    # A processor that stops with its interrupts held, ten seconds after it began.
+    main = tmp_path / "main.c"
+    hang = "if (board_millis() > 10000u) {\n board_mask(true);\n for (;;) {\n }\n }"
+    main.write_text(main.read_text().replace("firmware_poll();", f"firmware_poll();\n{hang}"))
+    with Clock(one) as clock, booted(one, tmp_path, board, clock.address) as (address, _):
+        clock.patience = 0.5
+        device = connected(address)
+        device.hold(30.0)
+        assert within(lambda: clock.volts[-1] == pytest.approx(30.0, abs=1e-3))
+        # Nobody feeds it: after twice its second the board begins anew, in off.
+        assert within(lambda: clock.begun == 2)
+        assert within(lambda: clock.volts[-1] == SAFE)
+        state = device.state()
+        assert (state.mode, state.fault) == ("off", "none")
+        assert state.tick < len(clock.volts)
         device.close()
 
 
