@@ -7,6 +7,7 @@ import os
 import re
 import sys
 import textwrap
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -138,10 +139,18 @@ class Output(Printing):
 
         from .._support.files.writing import make_folder, replacing
 
+        made = not self.folder.exists()
         folder = make_folder(self.folder)
         if not self.is_file:
-            with self._style():
-                return list(save(folder))
+            try:
+                with self._style():
+                    return list(save(folder))
+            except BaseException:
+                # A folder with nothing in it is no result.
+                if made:
+                    with suppress(OSError):
+                        folder.rmdir()
+                raise
         with TemporaryDirectory() as place, self._style():
             ending = self.out.suffix.lower()
             found = sorted(save(Path(place)), key=lambda path: path.name != main)

@@ -45,6 +45,15 @@ def test_the_c_of_a_file_is_that_of_the_controller() -> None:
     assert Path("c/x_axis.c").read_bytes() != before
 
 
+def test_a_refused_export_leaves_no_folder() -> None:
+    save(span=(-2e-5, 1.5e-4), dt=1e-4)
+    assert "--clock is 0.1 MHz" in refusal("export", "loop.json", "--clock", "100kHz", "--out", "c")
+    assert not Path("c").exists()
+    Path("c").mkdir()
+    refusal("export", "loop.json", "--clock", "100kHz", "--out", "c")
+    assert Path("c").is_dir()
+
+
 def test_a_table_beyond_the_limits_is_told() -> None:
     """At 5 um the settled loop of this stage needs less than 0 V."""
     controller = save(feedforward=PLAYS.inverse(), limits=(5.0, 75.0))
