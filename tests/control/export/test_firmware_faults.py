@@ -179,6 +179,20 @@ def test_a_sensor_at_an_end_of_its_range_gives_no_reading(code: int, tmp_path: P
 
 
 @needs_gcc
+def test_a_second_client_is_told_that_it_is_one(
+    tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    with booted(controller(), tmp_path, "host", stage.address) as (address, _):
+        device = connected(address)
+        for _ in range(5):
+            with pytest.raises(pt.DeviceError, match="another program has the link"):
+                pt.hardware.connect(address)
+        assert device.state().mode == "off"
+        device.close()
+        connected(address).close()
+
+
+@needs_gcc
 def test_half_a_line_is_not_that_of_the_next_client(
     tmp_path: Path, stage: pt.hardware.Converters
 ) -> None:

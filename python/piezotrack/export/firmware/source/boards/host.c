@@ -156,6 +156,19 @@ static void flush_output(void)
     output_bytes = 0;
 }
 
+/* Tells a second client that it is one. */
+static void turn_away(void)
+{
+    static const char busy[] = "error another program has the link\n";
+    const int other = accept(listener, NULL, NULL);
+    if (other >= 0) {
+        if (write(other, busy, sizeof busy - 1u) < 0) {
+            perror("second client");
+        }
+        (void)close(other);
+    }
+}
+
 /* Takes what the converters have sent; calls firmware_sample for a whole frame. */
 static void take_sample(void)
 {
@@ -178,7 +191,7 @@ static void take_sample(void)
 int board_get(void)
 {
     bool had_client;
-    struct pollfd watched[2] = {{0, POLLIN, 0}, {0, POLLIN, 0}};
+    struct pollfd watched[3] = {{0, POLLIN, 0}, {0, POLLIN, 0}, {0, POLLIN, 0}};
     if (input_place < input_bytes) {
         return input[input_place++];
     }
@@ -189,13 +202,17 @@ int board_get(void)
     }
     watched[0].fd = held ? -1 : converters;
     watched[1].fd = client >= 0 ? client : listener;
-    if (poll(watched, 2, PATIENCE) <= 0) {
+    watched[2].fd = client >= 0 ? listener : -1;
+    if (poll(watched, 3, PATIENCE) <= 0) {
         return -1;
     }
     if (watched[0].revents != 0) {
         take_sample();
     }
     if (watched[1].revents == 0) {
+        if (watched[2].revents != 0) {
+            turn_away();
+        }
         return -1;
     }
     if (client < 0) {
