@@ -38,6 +38,9 @@ def axes_in(file: Path) -> MultiAxisModel | None:
     from ...multiaxis.modal_model import FORMAT
     from ...multiaxis.model_file import load_axes
 
+    # A file that is not there is told where it is needed.
+    if not file.is_file():
+        return None
     _, document = read_content(file)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         return None

@@ -21,7 +21,7 @@ pub(super) fn unknowns(terms: &ModalTerms) -> usize {
     terms.poles.len() * 2 * (1 + drives + sensors) + drives * sensors
 }
 
-/// What the unknowns multiply: the derivative of the response by an unknown is `R s + I t` with
+/// Factors of the unknowns: the derivative of the response by an unknown is `R s + I t` with
 /// constant real matrices R and I, and complex functions of frequency s and t.
 ///
 /// The unknowns are logarithms of decays, angles, real and imaginary parts of c and of b, and D.

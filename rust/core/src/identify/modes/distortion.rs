@@ -19,7 +19,7 @@ const DEPENDENT: f64 = 1e-6;
 /// Most pairs of a mode and a regressor.
 const MOST: usize = 600;
 
-/// Lines of what the modes leave of displacements at one level, and of inputs that may explain it.
+/// Lines of the residual of the modes at one level, and of inputs that may explain it.
 ///
 /// Complex numbers are real and imaginary part.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +30,7 @@ pub struct DistortionRecord<'a> {
     pub angles: &'a [f64],
     /// Inputs, line by line and input by input, of all realisations; the drives come first.
     pub inputs: &'a [[f64; 2]],
-    /// What the modes leave, line by line and sensor by sensor, of all realisations.
+    /// Residual of the modes, line by line and sensor by sensor, of all realisations.
     pub residual: &'a [[f64; 2]],
     /// Weights, line by line, of the sensors.
     pub weights: &'a [f64],
@@ -232,7 +232,7 @@ impl Level {
         Ok(found)
     }
 
-    /// What a pair lowers the criterion by, without its penalty.
+    /// Reduction of the criterion by a pair, without its penalty.
     fn gain(&self, mode: usize, input: usize) -> f64 {
         let (i, j) = (2 * mode * self.inputs + input, (2 * mode + 1) * self.inputs + input);
         let (a, b) = (self.diagonal[i], self.diagonal[j]);
@@ -436,7 +436,7 @@ impl Sums<'_> {
     }
 }
 
-/// What real and imaginary part of e of each mode multiply at a line: `c f + conj(c) g` and
+/// Factors of real and imaginary part of e of each mode at a line: `c f + conj(c) g` and
 /// `i (c f - conj(c) g)` with `f = 1/(z - p)` and `g = 1/(z - conj p)`, sensor by sensor.
 #[inline(always)]
 fn functions(terms: &ModalTerms, angle: f64) -> Vec<C> {

@@ -21,7 +21,7 @@ const TRIES: usize = 14;
 const DECAY: f64 = 0.7;
 const TURN: f64 = 2.0;
 
-/// What a step of a pole by its scale costs at least, relative to the misfit: poles that the
+/// Least price of a step of a pole by its scale, relative to the misfit: poles that the
 /// response does not show stay where they are.
 const HELD: f64 = 1e-6;
 
@@ -212,7 +212,7 @@ impl Step {
 struct Departure {
     distances: Vec<f64>,
     sizes: Vec<f64>,
-    /// What it costs.
+    /// Price of a departure by its scale.
     price: f64,
 }
 
