@@ -202,7 +202,7 @@ def _configuration(
         "@step": number(step, "ramp"),
         "@bottom": number(span[0], "span"),
         "@top": number(span[1], "span"),
-        "@bytes": "4" if single else "8",
+        "@bytes": "4u" if single else "8u",
         "@call": CALLS[sources.forward],
         "@takes": "1" if sources.forward == "given" else "0",
     }
@@ -260,12 +260,12 @@ typedef @NAME_real real;
 
 /* Converters: code 0 and the highest code. The DAC reaches at least from limit to limit. */
 #ifndef DAC_BITS
-#define DAC_BITS 20
+#define DAC_BITS 20u
 #define DAC_LOW_VOLTS LIMITS_LOW
 #define DAC_HIGH_VOLTS LIMITS_HIGH
 #endif
 #ifndef ADC_BITS
-#define ADC_BITS 20
+#define ADC_BITS 20u
 #define ADC_LOW_METRES @bottom
 #define ADC_HIGH_METRES @top
 #endif
@@ -305,7 +305,7 @@ typedef @NAME_real real;
 #define SAFE_VOLTS @safe
 #define SAFE_STEP @step
 
-#define CODE_MOST(bits) ((real)(0xFFFFFFFFu >> (32 - (bits))))
+#define CODE_MOST(bits) ((real)(0xFFFFFFFFu >> (32u - (bits))))
 #define DAC_ZERO_VOLTS DAC_LOW_VOLTS
 #define DAC_CODE_MOST CODE_MOST(DAC_BITS)
 #define DAC_CODES_PER_VOLT (DAC_CODE_MOST / (DAC_HIGH_VOLTS - DAC_LOW_VOLTS))

@@ -154,7 +154,13 @@ void firmware_sample(uint32_t code, unsigned from_converters)
     bool records = true;
     status.tick++;
     status.reading = invalid ? not_a_number() : ADC_ZERO_METRES + (real)code * ADC_METRES_PER_CODE;
-    sample.flags = (invalid ? SAMPLE_INVALID : 0u) | (overrun ? SAMPLE_OVERRUN : 0u);
+    sample.flags = 0u;
+    if (invalid) {
+        sample.flags |= SAMPLE_INVALID;
+    }
+    if (overrun) {
+        sample.flags |= SAMPLE_OVERRUN;
+    }
     if (invalid && status.invalid < UINT32_MAX) {
         status.invalid++;
     }

@@ -277,7 +277,9 @@ static void answer(char *rest)
         say(firmware_clear(), "clear: no fault, or not at the safe voltage yet");
     } else if (text_same(verb, "read")) {
         read_samples(rest);
-    } else if (!answer_settings(verb, rest)) {
+    } else if (answer_settings(verb, rest)) {
+        /* it has answered */
+    } else {
         say(false, "command: expected ping, id, state, hold, exchange, load, play, run, follow, stop, "
                "clear, read, setting, stage, set, tune or save");
     }

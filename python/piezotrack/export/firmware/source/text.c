@@ -13,9 +13,14 @@ union pattern {
     bits bits;
 };
 
-#define DIGITS (2 * REAL_BYTES)
+#define DIGITS (2u * REAL_BYTES)
 /* Decimal exponents that are read; beyond them a number is none. */
 #define EXPONENT_MOST 400
+
+static char digit_of(uint32_t number)
+{
+    return "0123456789abcdef"[number & 15u];
+}
 
 void text_put(const char *text)
 {
@@ -30,7 +35,7 @@ void text_put_count(uint32_t count)
     char digits[10];
     int n = 0;
     do {
-        digits[n] = (char)('0' + (char)(count % 10u));
+        digits[n] = digit_of(count % 10u);
         count /= 10u;
         n++;
     } while (count > 0u);
@@ -43,11 +48,11 @@ void text_put_count(uint32_t count)
 void text_put_bits(real number)
 {
     union pattern pattern;
-    int i;
+    uint32_t left;
     pattern.number = number;
     board_put('x');
-    for (i = DIGITS - 1; i >= 0; i--) {
-        board_put("0123456789abcdef"[(pattern.bits >> (4 * i)) & 15u]);
+    for (left = DIGITS; left > 0u; left--) {
+        board_put(digit_of((uint32_t)(pattern.bits >> (4u * (left - 1u))) & 15u));
     }
 }
 
@@ -56,6 +61,7 @@ void text_put_decimal(real number)
     uint32_t whole;
     uint32_t place = 100000u;
     int exponent = 0;
+    real scaled;
     if (!((number - number) <= (real)0)) {
         text_put("nan");
         return;
@@ -65,24 +71,29 @@ void text_put_decimal(real number)
         number = -number;
     }
     if (number > (real)0) {
-        while (number >= (real)10) {
+        bool far = number >= (real)10;
+        while (far) {
             number /= (real)10;
             exponent++;
+            far = number >= (real)10;
         }
-        while (number < (real)1) {
+        far = number < (real)1;
+        while (far) {
             number *= (real)10;
             exponent--;
+            far = number < (real)1;
         }
     }
-    whole = (uint32_t)(number * (real)100000 + (real)0.5);
+    scaled = number * (real)100000 + (real)0.5;
+    whole = (uint32_t)scaled;
     if (whole >= 1000000u) {
         whole /= 10u;
         exponent++;
     }
-    board_put((char)('0' + (char)(whole / place)));
+    board_put(digit_of(whole / place));
     board_put('.');
     for (place /= 10u; place > 0u; place /= 10u) {
-        board_put((char)('0' + (char)(whole / place % 10u)));
+        board_put(digit_of((whole / place) % 10u));
     }
     board_put('e');
     if (exponent < 0) {
@@ -137,25 +148,30 @@ bool text_count(const char *word, uint32_t *count)
     return true;
 }
 
+/* The value of a hexadecimal digit; 16 where it is none. */
+static uint32_t value_of(char digit)
+{
+    uint32_t value;
+    for (value = 0u; value < 16u; value++) {
+        const char known = digit_of(value);
+        if (known == digit) {
+            break;
+        }
+    }
+    return value;
+}
+
 static bool hexadecimal(const char *word, real *number)
 {
     union pattern pattern;
-    int n;
-    pattern.bits = 0;
-    for (n = 0; word[n] != '\0'; n++) {
-        const char c = word[n];
-        bits digit;
-        if (c >= '0' && c <= '9') {
-            digit = (bits)(c - '0');
-        } else if (c >= 'a' && c <= 'f') {
-            digit = (bits)(c - 'a') + 10u;
-        } else {
+    uint32_t n;
+    pattern.bits = 0u;
+    for (n = 0u; word[n] != '\0'; n++) {
+        const uint32_t digit = value_of(word[n]);
+        if ((digit > 15u) || (n == DIGITS)) {
             return false;
         }
-        if (n == DIGITS) {
-            return false;
-        }
-        pattern.bits = (pattern.bits << 4) | digit;
+        pattern.bits = (pattern.bits << 4u) | (bits)digit;
     }
     *number = pattern.number;
     return n == DIGITS;
