@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Complex = NDArray[np.complex128]
 
-__all__ = ["MultiAxisResponse", "approximate_axes"]
+__all__ = ["MultiAxisResponse", "approximate_axes", "smoothed"]
 
 # Lines on each side over which variances are averaged, and passes of the weights.
 SMOOTH, PASSES = 5, 4
@@ -210,7 +210,7 @@ def approximate_axes(record: MultiAxisRecord) -> MultiAxisResponse:
     if periods > 1:
         # Noise of the drive moves the displacement too: what it explains is none of the sensor.
         spread = np.square(np.abs(output - y[..., np.newaxis])).sum(axis=3)
-        noise = _smoothed(spread / (periods - 1) / periods)
+        noise = smoothed(spread / (periods - 1) / periods)
     value, variance, distortion = _weighted(u, y, noise)
     free = max(record.realisations - record.drives, periods - 1)
     least = NOISELESS * np.mean(np.square(np.abs(value)))
@@ -238,12 +238,12 @@ def _spectra(signals: Array, lines: NDArray[np.intp]) -> Complex:
     return np.asarray(np.moveaxis(np.stack(channels), (3, 0, 1, 2), (0, 1, 2, 3)))
 
 
-def _smoothed(values: Array) -> Array:
-    """Return the mean of neighbouring lines along the first axis."""
+def smoothed(values: Array, beside: int = SMOOTH) -> Array:
+    """Return the mean of neighbouring lines on both sides, along the first axis."""
     sums = np.cumsum(np.concatenate([np.zeros((1, *values.shape[1:])), values]), axis=0)
     count = len(values)
-    first = np.maximum(np.arange(count) - SMOOTH, 0)
-    last = np.minimum(np.arange(count) + SMOOTH + 1, count)
+    first = np.maximum(np.arange(count) - beside, 0)
+    last = np.minimum(np.arange(count) + beside + 1, count)
     width = (last - first).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray((sums[last] - sums[first]) / width)
 
@@ -279,7 +279,7 @@ def _weighted(u: Complex, y: Complex, noise: Array | None) -> tuple[Complex, Arr
         if free:
             floor = FLOOR * np.median(scatter, axis=2)
             least = NOISELESS * np.square(np.abs(y)).mean()
-            estimate = _smoothed(excess) / _smoothed(sizes)
+            estimate = smoothed(excess) / smoothed(sizes)
             distortion = np.maximum(np.maximum(estimate, floor), least)
             weights = 1.0 / (distortion[:, :, np.newaxis] + scatter)
             # Only ratios count, and the sizes stay near 1.

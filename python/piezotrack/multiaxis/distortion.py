@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from .approximation import smoothed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,7 +36,7 @@ POWER = 0.5
 # Residual, relative to the displacement, below which the modes describe all there is.
 LEAST = 1e-5
 # Neighbours on each side over which the variance is averaged.
-SMOOTH = 40
+BESIDE = 40
 
 
 @dataclass(frozen=True)
@@ -240,7 +241,7 @@ def _level(
         distortion = response.distortion[:, :, np.newaxis]
         quiet = np.sqrt((distortion / (distortion + response.noise)).mean(axis=1))
         x, e = (one * quiet[:, np.newaxis] for one in (x, e))
-    power = _averaged(np.square(np.abs(e) / scale).mean(axis=2))
+    power = smoothed(np.square(np.abs(e) / scale).mean(axis=2), BESIDE)
     weights = np.maximum(power, 1e-12 * power.max() or 1.0) ** -POWER
     angles = 2.0 * np.pi * lines / record.samples
     e /= scale
@@ -256,11 +257,3 @@ def _level(
 
 def _lines(signals: Array, lines: NDArray[np.intp]) -> Complex:
     return np.asarray(np.fft.rfft(signals, axis=0)[lines] * (2.0 / len(signals)))
-
-
-def _averaged(values: Array) -> Array:
-    """Return means over neighbouring lines along the first axis."""
-    sums = np.cumsum(np.concatenate([np.zeros((1, values.shape[1])), values]), axis=0)
-    places = np.arange(len(values))
-    first, last = np.maximum(places - SMOOTH, 0), np.minimum(places + SMOOTH + 1, len(values))
-    return np.asarray((sums[last] - sums[first]) / (last - first)[:, np.newaxis])

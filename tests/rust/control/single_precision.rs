@@ -76,7 +76,7 @@ fn most(values: impl Iterator<Item = f64>) -> f64 {
     values.map(f64::abs).fold(0.0, f64::max)
 }
 
-/// What the roundings of a sample add at most to the output of the PID, V.
+/// Largest part of the PID's output that the roundings of a sample make, V.
 ///
 /// The error is off by that of reference and reading and of their difference; a first difference
 /// takes it twice, a second four times, with as much again for its own three roundings. Each

@@ -65,12 +65,12 @@ where
     [pairs.fold(0.0, f64::max), double.iter().map(|volts| volts.abs()).fold(0.0, f64::max)]
 }
 
-/// What the roundings of three products of two rounded factors, and of their sums, are.
+/// Roundings of three products of two rounded factors, and of their sums.
 fn linear([x, v, a]: [f64; 3]) -> f64 {
     6.0 * U * (x * LARGEST[0] + v * LARGEST[1] + a * LARGEST[2])
 }
 
-/// What second and first differences of rounded displacements, and their own roundings, add.
+/// Roundings of second and first differences of rounded displacements, and of their own.
 fn differences([_, v, a]: [f64; 3]) -> f64 {
     let x = U * LARGEST[0];
     2.0 * v * x / DT + 6.0 * a * x / (DT * DT)
