@@ -139,8 +139,9 @@ def test_the_watchdog_resets_a_processor_that_hangs(board: str, tmp_path: Path) 
         device = connected(address)
         device.hold(30.0)
         assert within(lambda: clock.volts[-1] == pytest.approx(30.0, abs=1e-3))
-        # Nobody feeds it: after twice its second the board begins anew, in off.
-        assert within(lambda: clock.begun == 2)
+        # Nobody feeds it: after twice its second the board begins anew, in off. Emulated time is
+        # slower where the computer is busy.
+        assert within(lambda: clock.begun == 2, 90.0)
         assert within(lambda: clock.volts[-1] == SAFE)
         state = device.state()
         assert (state.mode, state.fault) == ("off", "none")
