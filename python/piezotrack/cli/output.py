@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from ..errors import ParameterError
+from ..errors import ParameterError, PiezotrackError
 from .advice import as_options
 from .command import Option, group
 from .process.terminal import one_line
@@ -145,7 +145,7 @@ class Output(Printing):
             try:
                 with self._style():
                     return list(save(folder))
-            except BaseException:
+            except PiezotrackError:
                 # A folder with nothing in it is no result.
                 if made:
                     with suppress(OSError):
