@@ -16,6 +16,7 @@ __all__ = [
     "Controller",
     "Conventional",
     "DescentSettings",
+    "DistortedModes",
     "Inverse",
     "LeastSquaresFit",
     "LocalFit",
@@ -579,9 +580,24 @@ class Regressors:
         self, drives: ArrayLike, displacements: ArrayLike, state: _Parts | None = None
     ) -> tuple[_Array, _Array, _Array]: ...
 
+_ForcedState = tuple[_Parts, _Parts, _Parts]
+
+@final
+class DistortedModes:
+    def __new__(
+        cls, system: ModalSystem, regressors: Regressors, forces: _Parts
+    ) -> DistortedModes: ...
+    def simulate(
+        self, state: _ForcedState, drive: ArrayLike
+    ) -> tuple[
+        _Array, tuple[tuple[_Array, _Array], tuple[_Array, _Array], tuple[_Array, _Array]]
+    ]: ...
+
 def choose_distortion(
-    levels: Sequence[tuple[_Terms, ArrayLike, _Parts, _Parts, ArrayLike]], drives: int
-) -> tuple[list[list[int]], list[list[list[float]]], list[float]]: ...
+    levels: Sequence[tuple[_Terms, ArrayLike, _Parts, _Parts, ArrayLike, Sequence[float]]],
+    drives: int,
+    most: int,
+) -> tuple[list[tuple[int, int, int, float, float]], list[list[list[float]]], list[float]]: ...
 def balanced_terms(given: _Terms) -> _FoundTerms: ...
 def aligned_terms(given: _Terms, other: _Terms) -> _FoundTerms: ...
 def circle_errors(

@@ -2,6 +2,8 @@
 # _support/lazy.py does at run time. One name a line, as `ruff format` keeps it.
 from .approximation import MultiAxisResponse as MultiAxisResponse
 from .approximation import approximate_axes as approximate_axes
+from .distortion import Distortion as Distortion
+from .distortion import ModalForce as ModalForce
 from .distortion import Regressors as Regressors
 from .identify import identify_axes as identify_axes
 from .loop.closed_loop import AxesMargins as AxesMargins

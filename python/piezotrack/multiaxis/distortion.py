@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -23,13 +23,17 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Complex = NDArray[np.complex128]
 
-__all__ = ["Regressors", "choose_distortion", "simulate_distorted"]
+__all__ = ["Distortion", "ModalForce", "Regressors", "choose_distortion", "simulate_distorted"]
 
 # Thresholds of stop operators, and the change of a drive per sample at which half of its saturation
 # is reached, in levels.
 DRIVE_STOPS, ELONGATION_STOPS, CHANGE = (0.5, 1.5), (0.4,), 1.0
 # Most unknowns, of modes times candidates, that are compared.
 MOST_COLUMNS = 3000
+# Powers of the level, of records at several and at one.
+POWERS, POWER_OF_ONE = (0, 1, 2, 3), (1,)
+# Most forces.
+MOST = 600
 # Power of the residual's variance by which lines are weighted: half way between equal weights, for
 # the displacement, and those of the largest likelihood.
 POWER = 0.5
@@ -98,9 +102,75 @@ class Regressors:
         )
 
 
+class ModalForce(NamedTuple):
+    """What a nonlinear function does to a mode.
+
+    Attributes
+    ----------
+    mode : int
+        The mode.
+    regressor : int
+        The function.
+    power : int
+        Power of the level.
+    value : complex
+        Its part of e at the reference level, divided by that.
+    """
+
+    mode: int
+    regressor: int
+    power: int
+    value: complex
+
+
+@dataclass(frozen=True)
+class Distortion:
+    r"""Nonlinear functions that act on modes, the same at all levels.
+
+    Beside the drives, mode i answers to functions n of drives and elongations by
+
+    .. math:: e_{ij}(L) = \sum_{f} L_0 (L / L_0)^{p_f} v_f
+
+    with the level L, the root mean square of the drives, the reference level :math:`L_0`, and the
+    forces f on mode i of function j. Beyond the levels of the records forces grow with the level
+    above them, and stay below them.
+
+    Attributes
+    ----------
+    regressors : Regressors
+        The functions.
+    forces : tuple of ModalForce
+        Powers p and values v.
+    reference : float
+        The level :math:`L_0` [V].
+    levels : (float, float)
+        The least and the largest level of the records [V].
+    """
+
+    regressors: Regressors = field(default_factory=Regressors)
+    forces: tuple[ModalForce, ...] = ()
+    reference: float = 1.0
+    levels: tuple[float, float] = (1.0, 1.0)
+
+    def __len__(self) -> int:
+        return len(self.forces)
+
+    def on(self, terms: ModalTerms, level: float) -> ModalTerms:
+        """Return modes whose forces of the drives are followed by those of the functions."""
+        if not self:
+            return terms
+        low, high = self.levels
+        grown = max(level / high, 1.0) * self.reference
+        ratio = min(max(level, low), high) / self.reference
+        acting = np.zeros((terms.poles.size, len(self.regressors)), dtype=np.complex128)
+        for mode, regressor, power, value in self.forces:
+            acting[mode, regressor] += grown * ratio**power * value
+        return replace(terms, forces=np.hstack([terms.forces, acting]))
+
+
 def simulate_distorted(
     terms: ModalTerms,
-    regressors: Regressors,
+    distortion: Distortion,
     level: float,
     drive: Array,
     state: Complex | None,
@@ -112,11 +182,11 @@ def simulate_distorted(
     Parameters
     ----------
     terms : ModalTerms
-        The modes with their forces.
-    regressors : Regressors
-        What the forces belong to, behind the drives.
+        The modes with all their forces.
+    distortion : Distortion
+        Of which functions they are.
     level : float
-        Root mean square of the drives to which the regressors are relative [V].
+        Root mean square of the drives [V].
     drive : ndarray, shape (samples, drives)
         Drives about their operating point [V].
     state : ndarray of complex or None
@@ -128,44 +198,54 @@ def simulate_distorted(
     -------
     y : ndarray, shape (samples, sensors)
         Displacements about the operating point [m].
-    state : ndarray of complex, shape (2 modes + 2 drives + regressors,)
-        States of the modes, of what the forces move, and of the regressors.
+    state : ndarray of complex, shape (2 modes + 2 drives + functions,)
+        States of the modes, of what the forces move, and of the functions.
     """
     modes, drives = terms.poles.size, drive.shape[1]
+    regressors = distortion.regressors
     if state is None:
         state = np.zeros(2 * modes + 2 * drives + len(regressors), dtype=np.complex128)
     first, second, memory = np.split(state, (modes, 2 * modes))
     last, values = np.split(memory.real, (2 * drives,))
+    # Below the least level products shrink; above the largest they keep their share.
+    core = _core.DistortedModes(
+        terms.core,
+        regressors.core(terms, max(level, distortion.levels[0])),
+        (terms.forces.real.ravel(), terms.forces.imag.ravel()),
+    )
+
+    def run() -> tuple[Array, Any]:
+        parts = (first.real, first.imag), (second.real, second.imag), (last, values)
+        return core.simulate(parts, drive.ravel())
+
     if periodic:
         first = terms.steady(drive)
-    y, first = terms.simulate(drive, first)
-    core = regressors.core(terms, level)
-    found, last, values = core.follow(drive.ravel(), y.ravel(), (last, values))
-    if periodic:
-        found, last, values = core.follow(drive.ravel(), y.ravel(), (last, values))
-    inputs = np.hstack([drive, found.reshape(len(drive), -1)])
-    forced = terms.forced
-    if periodic:
-        second = forced.steady(inputs)
-    moved, second = forced.simulate(inputs, second)
-    return y + moved, np.concatenate([first, second, last, values])
+        _, (_, _, (last, values)) = run()
+        _, (_, (real, imaginary), _) = run()
+        second = (real + 1j * imaginary) / (1.0 - terms.poles ** len(drive))
+    y, (one, other, memory) = run()
+    states = [real + 1j * imaginary for real, imaginary in (one, other)]
+    return y.reshape(len(drive), -1), np.concatenate([*states, *memory])
 
 
 def choose_distortion(
     records: Sequence[MultiAxisRecord],
     responses: Sequence[MultiAxisResponse],
     terms: Sequence[ModalTerms],
-) -> tuple[Regressors, list[ModalTerms], list[float]]:
+    *,
+    most: int = MOST,
+) -> tuple[Distortion, list[ModalTerms], list[float]]:
     r"""Choose the distortion that records show beyond the modes.
 
-    Mode i answers to regressors n, and to the drives so that no part linear in them is left, by
+    Mode i answers to functions n, and to the drives so that no part linear in them is left, by
 
     .. math:: w_i[k + 1] = p_i w_i[k] + e_i \cdot (u[k], n[k])
 
     which adds :math:`2 \Re \sum c_i w_i` to the displacements: a polynomial nonlinear state-space
     model (Paduart and others 2010, doi 10.1016/j.automatica.2010.01.001) whose nonlinear functions
-    follow from the linear motion, and so is stable. Entries of e are chosen one after the other
-    by the criterion of Schwarz (1978, doi 10.1214/aos/1176344136), with twice its penalty.
+    follow from the linear motion, and so is stable. Forces, each of a function on a mode with a
+    power of the level, are chosen one after the other by the criterion of Schwarz (1978, doi
+    10.1214/aos/1176344136), with twice its penalty.
 
     Parameters
     ----------
@@ -175,36 +255,54 @@ def choose_distortion(
         Their best linear approximations.
     terms : sequence of ModalTerms
         The modes at each level.
+    most : int, optional
+        Most forces, of two real numbers each.
 
     Returns
     -------
-    regressors : Regressors
-        Those that act on a mode; none where nothing was chosen.
+    distortion : Distortion
+        Functions and forces; none where nothing was chosen.
     terms : list of ModalTerms
-        The modes with their forces.
+        The modes, with b as near to each other as they can, and forces of the drives.
     left : list of float
         Rms of the residual with them at each level, relative to that without.
     """
     drives, modes = records[0].drives, terms[0].poles.size
     candidates = Regressors.candidates(drives, modes)
-    none = Regressors(), list(terms), [1.0] * len(terms)
+    none = Distortion(), list(terms), [1.0] * len(terms)
     columns = 2 * modes * (drives + len(candidates))
     if columns > MOST_COLUMNS or any(_too_few(one, modes) for one in records):
         return none
-    parts = zip(records, responses, terms, strict=True)
+    middle = terms[len(terms) // 2]
+    alike = []
+    for one in terms:
+        inputs, outputs = one.aligned(middle)
+        alike.append(replace(one, inputs=inputs, outputs=outputs))
+    parts = zip(records, responses, alike, strict=True)
     levels, shares = zip(*(_level(*part, candidates) for part in parts), strict=True)
     if max(shares) < LEAST:
         return none
-    pairs, forces, left = _core.choose_distortion(levels, drives)
-    if not pairs:
+    reference = records[len(records) // 2].level
+    powers = POWERS if len(records) > 1 else POWER_OF_ONE
+    given = [
+        (*level, [reference * (record.level / reference) ** power for power in powers])
+        for level, record in zip(levels, records, strict=True)
+    ]
+    chosen, linear, left = _core.choose_distortion(given, drives, most)
+    if not chosen:
         return none
-    kept = sorted({place - drives for _, place in pairs})
-    places = [*range(drives), *(drives + place for place in kept)]
+    kept = sorted({place - drives for _, place, *_ in chosen})
+    forces = tuple(
+        ModalForce(mode, kept.index(place - drives), powers[power], complex(real, imaginary))
+        for mode, place, power, real, imaginary in chosen
+    )
     found = []
-    for one, values in zip(terms, forces, strict=True):
-        numbers = np.array(values).reshape(modes, -1, 2)[:, places]
+    for one, values in zip(alike, linear, strict=True):
+        numbers = np.array(values).reshape(modes, drives, 2)
         found.append(replace(one, forces=numbers[..., 0] + 1j * numbers[..., 1]))
-    return candidates.only(kept), found, np.sqrt(left).tolist()
+    ends = records[0].level, records[-1].level
+    distortion = Distortion(candidates.only(kept), forces, reference, ends)
+    return distortion, found, np.sqrt(left).tolist()
 
 
 def _too_few(record: MultiAxisRecord, modes: int) -> bool:

@@ -13,7 +13,7 @@ from .._support.arguments import expect, has_entries
 from .._support.messages import quoted
 from ..errors import DataError, ParameterError
 from .approximation import MultiAxisResponse, approximate_axes
-from .distortion import Regressors, choose_distortion
+from .distortion import MOST, Distortion, choose_distortion
 from .modal_model import AxesLevel, MultiAxisModel
 from .record import MultiAxisRecord, check_same
 from .target import Target
@@ -44,7 +44,7 @@ def identify_axes(
     *,
     states: int | None = None,
     most: int = CAP,
-    distortion: bool = True,
+    distortion: bool | int = True,
 ) -> MultiAxisModel:
     """Identify the modes of a stage of several axes.
 
@@ -64,8 +64,9 @@ def identify_axes(
         10.1214/aos/1176344136), with twice its penalty.
     most : int, optional
         Most states where they are chosen.
-    distortion : bool, optional
-        Whether nonlinear functions of drives and elongations are sought that act on the modes.
+    distortion : bool or int, optional
+        Whether nonlinear functions of drives and elongations are sought that act on the modes; or
+        the most numbers that describe what they do.
 
     Returns
     -------
@@ -131,10 +132,11 @@ def identify_axes(
     levels = tuple(
         _level(response, targets[k], found[k], scale) for k, response in enumerate(responses)
     )
-    regressors = Regressors()
-    if _core.as_truth("distortion", distortion):
+    chosen = Distortion()
+    pairs = _pairs(distortion)
+    if pairs:
         linear = [one.terms for one in levels]
-        regressors, forced, shares = choose_distortion(records, responses, linear)
+        chosen, forced, shares = choose_distortion(records, responses, linear, most=pairs)
         levels = tuple(
             replace(one, terms=terms, distorted=left)
             for one, terms, left in zip(levels, forced, shares, strict=True)
@@ -153,11 +155,18 @@ def identify_axes(
         dt=records[0].dt,
         drive_unit=records[0].drive_unit,
         output_unit=records[0].output_unit,
-        regressors=regressors,
+        distortion=chosen,
         responses=tuple(responses),
         source=records[0].source,
         notes=tuple(notes),
     )
+
+
+def _pairs(distortion: bool | int) -> int:
+    """Return the most forces, each of two numbers."""
+    if isinstance(distortion, int) and not isinstance(distortion, bool):
+        return min(_core.as_count("distortion", distortion) // 2, MOST)
+    return MOST if _core.as_truth("distortion", distortion) else 0
 
 
 def _modes(name: str, states: int) -> int:

@@ -14,7 +14,7 @@ from .._support.display.result import Result
 from .._support.files.writing import write_result
 from .._support.messages import quoted
 from ..errors import DataError, ParameterError, ShapeError
-from .distortion import Regressors, simulate_distorted
+from .distortion import Distortion, simulate_distorted
 from .record import MultiAxisRecord, check_skip, relative_error
 
 if TYPE_CHECKING:
@@ -107,8 +107,8 @@ class MultiAxisModel(Result):
         Sampling interval [s].
     drive_unit, output_unit : str
         Units of the drives and of what the sensors read.
-    regressors : Regressors
-        Nonlinear functions that act on the modes; none where the records show no distortion.
+    distortion : Distortion
+        Nonlinear functions that act on the modes; empty where the records show none.
     responses : tuple of MultiAxisResponse
         The measured responses; none where the model was read from a file.
     source : str or None
@@ -126,7 +126,7 @@ class MultiAxisModel(Result):
     dt: float
     drive_unit: str = "V"
     output_unit: str = "m"
-    regressors: Regressors = field(default_factory=Regressors)
+    distortion: Distortion = field(default_factory=Distortion)
     responses: tuple[MultiAxisResponse, ...] = ()
     source: str | None = None
     notes: tuple[str, ...] = ()
@@ -165,7 +165,7 @@ class MultiAxisModel(Result):
         Returns
         -------
         ModalTerms
-            The modes, interpolated.
+            The modes, interpolated, with all forces of the distortion.
 
         Raises
         ------
@@ -173,9 +173,9 @@ class MultiAxisModel(Result):
             `level` is not above 0.
         """
         lower, upper, share = self._place(level)
-        if share == 0.0:
-            return lower.terms
-        return lower.terms.between(upper.terms, share)
+        size = lower.level if level is None else level
+        first, second = (self.distortion.on(one.terms, size) for one in (lower, upper))
+        return first if share == 0.0 else first.between(second, share)
 
     def response(self, frequency: ArrayLike, *, level: float | None = None) -> Complex:
         """Return the frequency responses.
@@ -270,12 +270,12 @@ class MultiAxisModel(Result):
         offset = (1.0 - share) * lower.output_mean + share * upper.output_mean
         moved = np.ascontiguousarray(drive - about)
         modes, memory = terms.poles.size, 0
-        if self.regressors:
-            memory = modes + 2 * self.drives + len(self.regressors)
+        if self.distortion:
+            memory = modes + 2 * self.drives + len(self.distortion.regressors)
         if isinstance(start, str):
             one_of("start", start, STARTS)
             state = np.zeros(modes + memory, dtype=np.complex128)
-            if start == "periodic" and not self.regressors:
+            if start == "periodic" and not self.distortion:
                 state = terms.steady(moved)
         else:
             try:
@@ -286,13 +286,12 @@ class MultiAxisModel(Result):
                 ) from None
             if state.shape != (modes + memory,):
                 raise ShapeError("start", f"the shape {state.shape}", f"{modes + memory} entries")
-        if not self.regressors:
+        if not self.distortion:
             y, last = terms.simulate(moved, state)
             return MultiAxisMotion(y + offset, last)
-        # Below the least level products shrink; above the largest they keep their share.
-        size = max(self.levels[0].level, lower.level if level is None else level)
+        size = lower.level if level is None else level
         periodic = isinstance(start, str) and start == "periodic"
-        y, last = simulate_distorted(terms, self.regressors, size, moved, state, periodic=periodic)
+        y, last = simulate_distorted(terms, self.distortion, size, moved, state, periodic=periodic)
         return MultiAxisMotion(y + offset, last)
 
     def score(self, record: MultiAxisRecord, *, skip: int = 100, start: str = "periodic") -> Array:
@@ -355,11 +354,7 @@ class MultiAxisModel(Result):
             "output_unit": self.output_unit,
             "dt_s": self.dt,
             "levels": [_level_document(one) for one in self.levels],
-            "regressors": {
-                "products": [list(one) for one in self.regressors.products],
-                "stops": [list(one) for one in self.regressors.stops],
-                "changes": [list(one) for one in self.regressors.changes],
-            },
+            "distortion": _distortion_document(self.distortion),
             "source": self.source,
             "notes": list(self.notes),
             "provenance": {"package": "piezotrack", "version": _core.__version__},
@@ -427,6 +422,20 @@ class MultiAxisModel(Result):
 def level_of(drive: Array) -> float:
     """Return the root mean square of drives about their means, shape (samples, drives)."""
     return float(np.sqrt(np.mean(np.square(drive - drive.mean(axis=0)))))
+
+
+def _distortion_document(distortion: Distortion) -> dict[str, Any]:
+    regressors = distortion.regressors
+    return {
+        "products": [list(one) for one in regressors.products],
+        "stops": [list(one) for one in regressors.stops],
+        "changes": [list(one) for one in regressors.changes],
+        "reference_rms": distortion.reference,
+        "forces": [
+            [one.mode, one.regressor, one.power, one.value.real, one.value.imag]
+            for one in distortion.forces
+        ],
+    }
 
 
 def _level_document(one: AxesLevel) -> dict[str, Any]:

@@ -42,8 +42,8 @@ class ModalTerms:
         c [m/V].
     direct : ndarray, shape (sensors, drives)
         D [m/V].
-    forces : ndarray of complex, shape (q, drives + regressors)
-        e of the distortion, as of `choose_distortion`; no columns where there is none.
+    forces : ndarray of complex, shape (q, drives) or (q, drives + functions)
+        e of the distortion, as of `choose_distortion`; empty where there is none.
     """
 
     poles: Complex
@@ -149,12 +149,6 @@ class ModalTerms:
             (1.0 - share) * self.direct + share * other.direct,
             forces,
         )
-
-    @cached_property
-    def forced(self) -> ModalTerms:
-        """The modes that the distortion moves, with drives and regressors as their drives."""
-        direct = np.zeros((self.outputs.shape[1], self.forces.shape[1]))
-        return ModalTerms(self.poles, self.forces, self.outputs, direct)
 
     @cached_property
     def core(self) -> _core.ModalSystem:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from .._support.arguments import positive
 from .._support.messages import quoted
 from ..errors import ParameterError, ShapeError
 from ..identification.fitted.model_file import checked_content, entries_of
-from .distortion import Regressors
+from .distortion import Distortion, ModalForce, Regressors
 from .modal_model import FORMAT, SCHEMA_VERSION, AxesLevel, MultiAxisModel
 from .modal_terms import ModalTerms
 
@@ -69,7 +70,7 @@ def load_axes(path: str | os.PathLike[str]) -> MultiAxisModel:
             raise ParameterError("levels", quoted(sizes), "rising numbers above 0")
         return MultiAxisModel(
             levels=levels,
-            regressors=_regressors(document.get("regressors", {}), levels),
+            distortion=_distortion(document.get("distortion", {}), levels),
             dt=_core.as_number("dt_s", document["dt_s"]),
             drive_unit=document["drive_unit"],
             output_unit=document["output_unit"],
@@ -91,10 +92,10 @@ def _level(entry: dict[str, Any]) -> AxesLevel:
     # Files of models without distortion have none of its entries.
     if entry.get("forces_real"):
         forces = _complex(entry, "forces", 2)
-        if forces.shape[0] != poles.size:
-            raise ShapeError("forces", f"{forces.shape[0]} rows", f"{poles.size}")
+        if forces.shape != (poles.size, drives):
+            raise ShapeError("forces", f"the shape {forces.shape}", f"{poles.size} x {drives}")
         terms = replace(terms, forces=forces)
-    _ = terms.core, terms.forced.core
+    _ = terms.core
     means = {
         name: _sized(_array(entry, name, 1), name, width)
         for name, width in (("drive_mean", drives), ("output_mean", sensors))
@@ -111,23 +112,35 @@ def _level(entry: dict[str, Any]) -> AxesLevel:
     )
 
 
-def _regressors(entry: dict[str, Any], levels: tuple[AxesLevel, ...]) -> Regressors:
-    """Return the regressors that the forces of all levels belong to."""
+def _distortion(entry: dict[str, Any], levels: tuple[AxesLevel, ...]) -> Distortion:
+    """Return the distortion of all levels."""
+    if not entry.get("forces"):
+        return Distortion()
     numbers = {
-        name: tuple(_sized_variable(name, row) for row in entry.get(name, []))
+        name: tuple(_sized_variable(name, row) for row in entry[name])
         for name in ("stops", "changes")
     }
     products = tuple(
-        tuple(_core.as_count("products", k) for k in variables)
-        for variables in entry.get("products", [])
+        tuple(_core.as_count("products", k) for k in variables) for variables in entry["products"]
     )
-    found = Regressors(products, **numbers)
-    drives = levels[0].terms.direct.shape[1]
-    expected = drives + len(found) if found else 0
-    for one in levels:
-        if one.terms.forces.shape[1] != expected:
-            raise ShapeError("forces", f"{one.terms.forces.shape[1]} columns", f"{expected}")
-    found.core(levels[0].terms, levels[0].level)
+    regressors = Regressors(products, **numbers)
+    modes = levels[0].terms.poles.size
+    forces = []
+    for row in entry["forces"]:
+        if not isinstance(row, list) or len(row) != 5:
+            raise ParameterError("forces", quoted(row), "rows of five numbers", verb="has")
+        mode, regressor, power = (_core.as_count("forces", k) for k in row[:3])
+        if mode >= modes or regressor >= len(regressors):
+            expected = f"a mode below {modes} and a function below {len(regressors)}"
+            raise ParameterError("forces", quoted(row), expected, verb="has")
+        real, imaginary = (_core.as_number("forces", value) for value in row[3:])
+        forces.append(ModalForce(mode, regressor, power, complex(real, imaginary)))
+    if any(not one.terms.forces.size for one in levels):
+        raise ShapeError("forces_real", "no forces of the drives", "those of each level")
+    reference = positive("reference_rms", entry["reference_rms"], "V")
+    ends = levels[0].level, levels[-1].level
+    found = Distortion(regressors, tuple(forces), reference, ends)
+    regressors.core(levels[0].terms, levels[0].level)
     return found
 
 

@@ -35,6 +35,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     stages::xy::register(module)?;
     stages::modal_system::register(module)?;
     stages::modal_fit::register(module)?;
+    stages::distorted::register(module)?;
     stages::distortion::register(module)?;
     stages::regressors::register(module)
 }

@@ -69,23 +69,44 @@ fn pairs_that_made_a_residual_are_found_with_their_forces() {
         }
     }
     let weights = vec![1.0; LINES * SENSORS];
-    let record = DistortionRecord {
+    // The second level is 3 times the first, and its residual shows e of power 1 grown by it.
+    let levels = [[1.0, 1.0, 1.0], [1.0, 3.0, 9.0]];
+    let grown: Vec<C> =
+        inputs
+            .iter()
+            .enumerate()
+            .map(|(k, n)| {
+                if (k / REALISATIONS).is_multiple_of(INPUTS) {
+                    *n
+                } else {
+                    n.map(|part| part / 3.0)
+                }
+            })
+            .collect();
+    let first = DistortionRecord {
         terms: &terms,
         angles: &angles,
         inputs: &inputs,
         residual: &residual,
         weights: &weights,
+        powers: &levels[0],
     };
-    let found = choose_distortion(&[record, record], 1, NEVER).unwrap();
-    let mut pairs = found.pairs.clone();
+    let second = DistortionRecord { inputs: &grown, powers: &levels[1], ..first };
+    let found = choose_distortion(&[first, second], 1, 9, NEVER).unwrap();
+    let mut pairs: Vec<_> = found.forces.iter().map(|one| [one.mode, one.input]).collect();
     pairs.sort_unstable();
     assert_eq!(pairs, [[1, 3], [2, 5]]);
-    for (mode, input, force) in made {
-        let e = found.forces[0][mode * INPUTS + input];
+    let apart = |e: C, force: C| (e[0] - force[0]).hypot(e[1] - force[1]);
+    for (mode, input, force) in &made[1..] {
+        let one = found.forces.iter().find(|one| [one.mode, one.input] == [*mode, *input]).unwrap();
         // A thousandth of ridge, and the noise.
-        assert!((e[0] - force[0]).hypot(e[1] - force[1]) < 0.01, "{e:?} for {force:?}");
+        assert_eq!(one.power, 1);
+        assert!(apart(one.force, *force) < 0.01, "{:?} for {force:?}", one.force);
     }
-    assert_eq!(found.forces[0], found.forces[1]);
+    for linear in &found.linear {
+        assert!(apart(linear[0], made[0].2) < 0.01, "{linear:?}");
+    }
+    assert_eq!(choose_distortion(&[first, second], 1, 1, NEVER).unwrap().forces.len(), 1);
     // What is left is the noise: twice 0.01^2 for each complex number.
     let power: f64 = residual.iter().flatten().map(|part| part * part).sum();
     let left = found.left[0] * power / (residual.len() as f64 * 2e-4);
@@ -106,14 +127,17 @@ fn noise_alone_gives_no_pair() {
         inputs: &inputs,
         residual: &residual,
         weights: &weights,
+        powers: &[1.0],
     };
-    assert!(choose_distortion(&[record], 1, NEVER).unwrap().pairs.is_empty());
+    assert!(choose_distortion(&[record], 1, 9, NEVER).unwrap().forces.is_empty());
     let short = DistortionRecord { weights: &weights[1..], ..record };
-    assert!(choose_distortion(&[short], 1, NEVER).is_err());
-    assert!(choose_distortion(&[record], INPUTS + 1, NEVER).is_err());
+    assert!(choose_distortion(&[short], 1, 9, NEVER).is_err());
+    assert!(choose_distortion(&[record], INPUTS + 1, 9, NEVER).is_err());
+    let fewer = DistortionRecord { powers: &[], ..record };
+    assert!(choose_distortion(&[record, fewer], 1, 9, NEVER).is_err());
     let none = vec![f64::NAN; weights.len()];
     let lost = DistortionRecord { weights: &none, ..record };
-    assert!(choose_distortion(&[lost], 1, NEVER).is_err());
+    assert!(choose_distortion(&[lost], 1, 9, NEVER).is_err());
     assert!(Regressors::new([1, 0], &[1.0], vec![]).is_err());
     assert!(Regressors::new([1, 1], &[1.0; 3], vec![]).is_err());
     assert!(Regressors::new([1, 1], &[1.0; 2], vec![Regressor::Product(vec![1])]).is_err());

@@ -59,12 +59,12 @@ def model_text(model: MultiAxisModel) -> str:
             f"{100 * one.misfit:.2f} % of the response; noise and distortion explain "
             f"{100 * one.expected:.2f} %"
         )
-    if model.regressors:
-        entries = int(np.count_nonzero(levels[0].terms.forces[:, model.drives :]))
+    if model.distortion:
         shares = ", ".join(f"{100 * one.distorted:.0f}" for one in levels)
         lines.append(
-            f"distortion: {entries} forces of {len(model.regressors)} nonlinear functions leave "
-            f"{shares} % of the residual of the modes"
+            f"distortion: {2 * len(model.distortion)} numbers of "
+            f"{len(model.distortion.regressors)} nonlinear functions leave {shares} % of the "
+            "residual of the modes"
         )
     (above, scale), (below, divisor) = shown_unit(model.output_unit), shown_unit(model.drive_unit)
     rows = [

@@ -33,7 +33,9 @@ pub use least_squares::{
     CreepKind, DynamicsKind, LeastSquaresFit, NodesKind, RecordFit, Settings as WeightsSettings,
     Structure, WeightsDelay, WeightsRecord, identify_weights,
 };
-pub use modes::{Descent, Distortion, DistortionRecord, ModalFit, ModalTerms, choose_distortion};
+pub use modes::{
+    Descent, Distortion, DistortionRecord, ModalFit, ModalForce, ModalTerms, choose_distortion,
+};
 pub use parameters::bounds;
 pub use parameters::candidate::{
     BEFORE, Candidate, DELAY, DRIFT_TIME, ITS_OWN, PLACES, Point, Theta,

@@ -21,7 +21,8 @@ pub use amplifier::{Amplifier, AmplifierFlow};
 pub use apparatus::{Apparatus, ApparatusState};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use modes::{
-    AxesLoop, AxesRun, ModalState, ModalSystem, Regressor, RegressorState, Regressors,
+    AxesLoop, AxesRun, DistortedModes, DistortedState, ModalState, ModalSystem, Regressor,
+    RegressorState, Regressors,
 };
 pub use open_loop::{OpenLoop, open_loop};
 pub use sensor::{Sensor, SensorState};

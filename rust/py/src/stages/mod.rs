@@ -1,5 +1,6 @@
 //! Models, stages, their inverses, and virtual stages on one axis, two and several.
 
+pub mod distorted;
 pub mod distortion;
 pub mod inverse;
 pub mod modal_fit;

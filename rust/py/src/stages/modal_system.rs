@@ -32,7 +32,7 @@ type Gains = (f64, f64, f64, Option<f64>);
 
 /// A sampled system of modes in parallel.
 #[pyclass(name = "ModalSystem", frozen, module = "piezotrack._core")]
-struct PyModalSystem(ModalSystem);
+pub(super) struct PyModalSystem(pub(super) ModalSystem);
 
 pub(super) fn complex(name: &str, (real, imaginary): &Parts<'_>) -> PyResult<Vec<[f64; 2]>> {
     let (real, imaginary) = (samples(name, real)?, samples(name, imaginary)?);

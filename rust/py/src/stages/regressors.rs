@@ -21,7 +21,7 @@ type Followed<'py> =
 
 /// Functions of variables that are linear in the drives and the displacements of a sample.
 #[pyclass(name = "Regressors", frozen, module = "piezotrack._core")]
-struct PyRegressors(Regressors);
+pub(super) struct PyRegressors(pub(super) Regressors);
 
 #[pymethods]
 impl PyRegressors {

@@ -9,13 +9,14 @@ mod derivatives;
 mod deviations;
 mod distortion;
 mod factors;
+mod normal_equations;
 mod products;
 mod pursuit;
 mod refine;
 mod responses;
 mod terms;
 
-pub use distortion::{Distortion, DistortionRecord, choose_distortion};
+pub use distortion::{Distortion, DistortionRecord, ModalForce, choose_distortion};
 pub use refine::Descent;
 pub use responses::ModalFit;
 pub use terms::ModalTerms;

@@ -27,8 +27,8 @@ use crate::math::{dispatch_fused, room, zeros};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModalSystem {
-    drives: usize,
-    sensors: usize,
+    pub(super) drives: usize,
+    pub(super) sensors: usize,
     /// Real and imaginary parts of the poles.
     poles: [Vec<f64>; 2],
     /// Real and imaginary parts of b, drive by drive.
@@ -138,21 +138,12 @@ impl ModalSystem {
         direct: &[f64],
     ) -> Result<Self> {
         check_modes([drives, sensors], poles, inputs, outputs, direct)?;
-        // Mode after mode in memory, for each drive and sensor.
-        let turned = |entries: &[[f64; 2]], width: usize, part: usize, factor: f64| {
-            let mut found = room("the modes", entries.len())?;
-            for channel in 0..width {
-                let column = entries.iter().skip(channel).step_by(width);
-                found.extend(column.map(|entry| factor * entry[part]));
-            }
-            Ok::<Vec<f64>, Error>(found)
-        };
         Ok(Self {
             drives,
             sensors,
-            poles: [turned(poles, 1, 0, 1.0)?, turned(poles, 1, 1, 1.0)?],
-            inputs: [turned(inputs, drives, 0, 1.0)?, turned(inputs, drives, 1, 1.0)?],
-            outputs: [turned(outputs, sensors, 0, 2.0)?, turned(outputs, sensors, 1, -2.0)?],
+            poles: by_channel(poles, 1, [1.0, 1.0])?,
+            inputs: by_channel(inputs, drives, [1.0, 1.0])?,
+            outputs: by_channel(outputs, sensors, [2.0, -2.0])?,
             direct: direct.to_vec(),
         })
     }
@@ -172,42 +163,43 @@ impl ModalSystem {
         Ok(ModalState { real: zeros("the state", count)?, imaginary: zeros("the state", count)? })
     }
 
-    /// Adds the output of a state under a drive to `output`, which has an entry for each sensor.
+    /// Writes the output of a state under a drive to `output`, which has an entry for each sensor.
     #[inline(always)]
-    fn output(&self, state: &ModalState, drive: &[f64], output: &mut [f64]) {
+    pub(super) fn output(&self, state: &ModalState, drive: &[f64], output: &mut [f64]) {
+        for (slot, gains) in output.iter_mut().zip(self.direct.chunks_exact(self.drives)) {
+            *slot = gains.iter().zip(drive).map(|(gain, value)| gain * value).sum();
+        }
+        self.add_modes(state, output);
+    }
+
+    /// Adds what the modes of a state move to `output`.
+    #[inline(always)]
+    pub(super) fn add_modes(&self, state: &ModalState, output: &mut [f64]) {
         let count = self.modes();
         for (channel, slot) in output.iter_mut().enumerate() {
-            let mut sum = 0.0;
-            for (gain, value) in self.direct[channel * self.drives..].iter().zip(drive) {
-                sum += gain * value;
-            }
             let rows = self.outputs.each_ref().map(|part| &part[channel * count..][..count]);
             let gains = rows[0].iter().zip(rows[1]);
             for ((real, imaginary), (x, y)) in gains.zip(state.real.iter().zip(&state.imaginary)) {
-                sum += real * x + imaginary * y;
+                *slot += real * x + imaginary * y;
             }
-            *slot = sum;
         }
     }
 
     /// Advances a state by one sample under a drive, which has an entry for each channel.
     #[inline(always)]
-    fn advance(&self, state: &mut ModalState, drive: &[f64]) {
-        let count = self.modes();
+    pub(super) fn advance(&self, state: &mut ModalState, drive: &[f64]) {
+        self.turn(state);
+        push(&self.inputs, state, drive);
+    }
+
+    /// Advances a state by one sample without a drive.
+    #[inline(always)]
+    pub(super) fn turn(&self, state: &mut ModalState) {
         let poles = self.poles[0].iter().zip(&self.poles[1]);
         for ((p, q), (x, y)) in poles.zip(state.real.iter_mut().zip(&mut state.imaginary)) {
             let real = p * *x - q * *y;
             *y = q * *x + p * *y;
             *x = real;
-        }
-        for (channel, value) in drive.iter().enumerate() {
-            let rows = self.inputs.each_ref().map(|part| &part[channel * count..][..count]);
-            for (x, b) in state.real.iter_mut().zip(rows[0]) {
-                *x += b * value;
-            }
-            for (y, b) in state.imaginary.iter_mut().zip(rows[1]) {
-                *y += b * value;
-            }
         }
     }
 
@@ -287,7 +279,7 @@ impl ModalSystem {
     }
 
     /// The number of samples of a signal with some channels, where all sizes fit.
-    fn checked(
+    pub(super) fn checked(
         &self,
         state: &ModalState,
         name: &str,
@@ -297,6 +289,38 @@ impl ModalSystem {
         sized("state", state.real.len(), self.modes())?;
         sized("state", state.imaginary.len(), self.modes())?;
         whole_samples(name, entries, channels)
+    }
+}
+
+/// Real and imaginary parts of entries with so many channels of each mode, mode after mode for each
+/// channel, times two factors.
+pub(super) fn by_channel(
+    entries: &[[f64; 2]],
+    width: usize,
+    factors: [f64; 2],
+) -> Result<[Vec<f64>; 2]> {
+    let mut found = [room("the modes", entries.len())?, room("the modes", entries.len())?];
+    for channel in 0..width {
+        for entry in entries.iter().skip(channel).step_by(width) {
+            found[0].push(factors[0] * entry[0]);
+            found[1].push(factors[1] * entry[1]);
+        }
+    }
+    Ok(found)
+}
+
+/// Adds to a state what a drive does to it.
+#[inline(always)]
+pub(super) fn push(inputs: &[Vec<f64>; 2], state: &mut ModalState, drive: &[f64]) {
+    let count = state.real.len();
+    for (channel, value) in drive.iter().enumerate() {
+        let rows = inputs.each_ref().map(|part| &part[channel * count..][..count]);
+        for (x, b) in state.real.iter_mut().zip(rows[0]) {
+            *x += b * value;
+        }
+        for (y, b) in state.imaginary.iter_mut().zip(rows[1]) {
+            *y += b * value;
+        }
     }
 }
 
@@ -330,7 +354,7 @@ fn clip(target: &mut [f64], values: &[f64], limits: &[[f64; 2]]) {
 }
 
 /// The outputs, where they are finite.
-fn finite_outputs(outputs: Vec<f64>) -> Result<Vec<f64>> {
+pub(super) fn finite_outputs(outputs: Vec<f64>) -> Result<Vec<f64>> {
     if outputs.iter().all(|value| value.is_finite()) {
         return Ok(outputs);
     }

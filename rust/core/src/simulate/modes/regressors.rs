@@ -38,8 +38,8 @@ pub enum Regressor {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Regressors {
-    drives: usize,
-    sensors: usize,
+    pub(super) drives: usize,
+    pub(super) sensors: usize,
     /// From drives and displacements to the variables, variable by variable.
     matrix: Vec<f64>,
     list: Vec<Regressor>,
@@ -129,39 +129,61 @@ impl Regressors {
     ) -> Result<Vec<f64>> {
         let samples = whole_samples("drives", drives.len(), self.drives)?;
         sized("displacements", displacements.len(), samples.saturating_mul(self.sensors))?;
-        let rest = self.rest()?;
-        sized("state", state.last.len(), rest.last.len())?;
-        sized("state", state.values.len(), rest.values.len())?;
+        self.check(state)?;
         let mut found = room("the regressors", samples.saturating_mul(self.list.len()))?;
-        let mut now = rest.last;
+        let mut now = zeros("the variables", state.last.len())?;
         let sensors = displacements.chunks_exact(self.sensors);
         for (drive, displacement) in drives.chunks_exact(self.drives).zip(sensors) {
-            let rows = self.matrix.chunks_exact(self.drives + self.sensors);
-            for (slot, row) in now.iter_mut().zip(rows) {
-                let channels = row.iter().zip(drive.iter().chain(displacement));
-                *slot = channels.map(|(gain, value)| gain * value).sum();
-            }
-            for (value, one) in state.values.iter_mut().zip(&self.list) {
-                *value = match one {
-                    Regressor::Product(variables) => {
-                        variables.iter().map(|variable| now[*variable]).product()
-                    }
-                    Regressor::Stop { variable, threshold } => {
-                        let moved = now[*variable] - state.last[*variable];
-                        (*value + moved).clamp(-threshold, *threshold)
-                    }
-                    Regressor::Change { variable, scale } => {
-                        let moved = now[*variable] - state.last[*variable];
-                        moved / (scale + moved.abs())
-                    }
-                };
-            }
-            state.last.copy_from_slice(&now);
+            self.step(state, &mut now, drive, displacement);
             found.extend_from_slice(&state.values);
         }
         if found.iter().all(|value: &f64| value.is_finite()) {
             return Ok(found);
         }
         Err(Error::Numerical("a regressor leaves the range of numbers".into()))
+    }
+
+    /// Number of the regressors.
+    pub(super) fn count(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Refuses a state of other regressors.
+    pub(super) fn check(&self, state: &RegressorState) -> Result<()> {
+        let variables = self.matrix.len() / (self.drives + self.sensors);
+        sized("state", state.last.len(), variables)?;
+        sized("state", state.values.len(), self.list.len())
+    }
+
+    /// Advances a state by a sample; `now` has room for the variables.
+    #[inline(always)]
+    pub(super) fn step(
+        &self,
+        state: &mut RegressorState,
+        now: &mut [f64],
+        drive: &[f64],
+        displacement: &[f64],
+    ) {
+        let rows = self.matrix.chunks_exact(self.drives + self.sensors);
+        for (slot, row) in now.iter_mut().zip(rows) {
+            let channels = row.iter().zip(drive.iter().chain(displacement));
+            *slot = channels.map(|(gain, value)| gain * value).sum();
+        }
+        for (value, one) in state.values.iter_mut().zip(&self.list) {
+            *value = match one {
+                Regressor::Product(variables) => {
+                    variables.iter().map(|variable| now[*variable]).product()
+                }
+                Regressor::Stop { variable, threshold } => {
+                    let moved = now[*variable] - state.last[*variable];
+                    (*value + moved).clamp(-threshold, *threshold)
+                }
+                Regressor::Change { variable, scale } => {
+                    let moved = now[*variable] - state.last[*variable];
+                    moved / (scale + moved.abs())
+                }
+            };
+        }
+        state.last.copy_from_slice(now);
     }
 }
