@@ -103,7 +103,7 @@ class Regressors:
 
 
 class ModalForce(NamedTuple):
-    """What a nonlinear function does to a mode.
+    """Force of a nonlinear function on a mode.
 
     Attributes
     ----------

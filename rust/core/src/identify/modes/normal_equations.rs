@@ -28,11 +28,11 @@ pub(super) struct NormalEquations {
     pub size: f64,
     matrix: Vec<f64>,
     right: Vec<f64>,
-    /// What is left behind the drives.
+    /// The rest behind the drives.
     pub rest: Rest,
 }
 
-/// What is left of normal equations behind columns that are eliminated.
+/// The rest of normal equations behind columns that are eliminated.
 pub(super) struct Rest {
     inputs: usize,
     /// Rows of Cholesky's factor.
