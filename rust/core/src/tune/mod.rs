@@ -2,6 +2,7 @@
 //! keep for every model of a set, and the search.
 
 mod adaptation;
+mod bundled;
 mod contour;
 mod evolution;
 mod judge;
