@@ -191,7 +191,7 @@ links: $(VENV)/installed $(VENV)/site-tools ## Look for links of the site that l
 	$(BIN)/sphinx-build -q -b linkcheck -j auto -d target/site-cache docs target/links
 
 crate-docs: ## The crates' pages: target/doc
-	cargo doc --locked --no-deps
+	RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps
 
 architecture: $(VENV)/installed ## Draw docs/architecture.svg from the code
 	$(BIN)/python docs/make_architecture.py

@@ -14,7 +14,7 @@
 //! w^[k] = w-[k] + L (v[k-1] - w-[k] - (y[k] - p x^[k-1])/(g (1 - p)))
 //! ```
 //!
-//! w- is the operator's output after the way to x^[k], or to v[k-1]. With L = 0 the model runs
+//! w- is the operator's output after the way to `x^[k]`, or to `v[k-1]`. With L = 0 the model runs
 //! beside the stage; with L = 1 everything that the linear part does not explain counts as
 //! hysteresis, creep and disturbances too. Of the operator only the output is corrected, not its
 //! slope. The compensation takes the place of a feedforward by the inverse of the hysteresis, which

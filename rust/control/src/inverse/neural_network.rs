@@ -52,7 +52,7 @@ pub struct NetworkNumbers<'a> {
     pub offset: f64,
 }
 
-/// A network with one hidden layer as an inverse; see the [module](self).
+/// A network with one hidden layer as an inverse.
 ///
 /// ```
 /// use piezotrack_control::inverse::{NetworkNumbers, NeuralNetworkInverse};

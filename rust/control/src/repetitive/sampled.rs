@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::number::Real;
 use crate::snapshot::Snapshot;
 
-/// Coefficients of a repetitive controller for one sampling interval; see [`Repetitive::at`].
+/// Coefficients of a repetitive controller for one sampling interval; see [`crate::Repetitive::at`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledRepetitive<T = f64> {
     /// L/Ts and others.

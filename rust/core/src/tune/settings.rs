@@ -22,7 +22,7 @@ pub enum Setting {
     Integral,
     /// Derivative gain a sample, Kp Td/Ts, V/m.
     Derivative,
-    /// Cutoff of the low-pass on the measurement, Hz; above [`FASTEST`] there is none.
+    /// Cutoff of the low-pass on the measurement, Hz; above twice the sampling rate there is none.
     Cutoff,
     /// Middle of the notch, Hz.
     NotchFrequency,
