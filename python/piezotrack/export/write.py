@@ -18,7 +18,7 @@ from .c99.sources import c_sources, checked_name
 from .firmware.project import firmware_project, project_files
 from .fmu.unit import compiler, fmu_bytes
 from .json_form import coefficients_document
-from .library import library_sources
+from .library.calls import library_sources
 
 if TYPE_CHECKING:
     import os
@@ -202,7 +202,8 @@ def export_controller(
                 "given with to='firmware'",
                 "neither: tables are loaded over its link",
             )
-        texts, sources = firmware_project(controller, name, **chosen)
+        project = firmware_project(controller, name, **chosen)
+        texts, sources = project.files, project.controller
     else:
         if to == "fmu":
             compiler()
