@@ -64,6 +64,7 @@ def booted(
     converters: tuple[str, int],
     *settings: str,
     emulator: tuple[str, ...] | None = None,
+    link: str = "",
     **options: Any,
 ) -> Iterator[tuple[str, subprocess.Popen[str]]]:
     """Export, build and start; the address of the firmware, and its process.
@@ -84,7 +85,7 @@ def booted(
             *("-nographic", "-monitor", "none"),
             *(emulator if emulator is not None else COUNTED if board in TIMED else ()),
             *("-kernel", f"axis-{board}.elf"),
-            *("-serial", f"tcp:{place},server=on,wait=off,nodelay=on"),
+            *("-serial", link or f"tcp:{place},server=on,wait=off,nodelay=on"),
             *("-serial", f"tcp:127.0.0.1:{port},nodelay=on"),
         ]
         address = f"firmware://{place}"

@@ -266,6 +266,41 @@ def test_a_client_that_does_not_read_is_hung_up_on(
             assert within(lambda: stage.voltage == SAFE)
 
 
+@needs_cross
+@pytest.mark.slow
+def test_answers_that_a_client_does_not_read_do_not_stop_a_board(tmp_path: Path) -> None:
+    """What does not leave is dropped, a line is never a mixture of two, and sampling goes on."""
+    one, path = controller(), tmp_path / "link"
+    place = f"unix:{path.name},server=on,wait=off"
+    with (
+        Clock(one) as clock,
+        booted(one, tmp_path, "m4", clock.address, link=place),
+        socket.socket(socket.AF_UNIX) as link,
+    ):
+        assert within(path.exists)
+        link.connect(str(path))
+        link.settimeout(20.0)
+        link.sendall(b"hold 60\n")
+        # Few bytes find room. Longer than twice the time of the watchdog nobody reads.
+        for _ in range(50):
+            link.sendall(b"id\n")
+            time.sleep(0.1)
+        received = b""
+        while select.select([link], [], [], 1.0)[0]:
+            received += link.recv(2**16)
+        # The first command ends the line that was cut.
+        link.sendall(b"ping\nstate\n")
+        while b"fault=" not in received or not received.endswith(b"\n"):
+            received += link.recv(2**16)
+        assert clock.volts[-1] == pytest.approx(60.0, abs=1e-3)
+    answers = received.decode().splitlines()
+    assert answers[0] == "ok"
+    assert answers[-1].startswith("ok hold fault=none")
+    assert len(answers) < 40
+    # Of two answers there is no mixture.
+    assert all(line.startswith("ok") and line.count("ok") == 1 for line in answers)
+
+
 @needs_gcc
 def test_lines_that_make_no_sense_are_answered(
     tmp_path: Path, stage: pt.hardware.Converters

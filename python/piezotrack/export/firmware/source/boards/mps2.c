@@ -55,6 +55,8 @@ struct timer {
 
 #define CLOCK_HZ 25000000u
 #define WATCHDOG_MS 1000u
+/* How long an answer may take to leave before the rest of it is dropped. */
+#define LEAVING_MS 50u
 /* Bytes of a sample from the converters, and of the answer. */
 #define FRAME 5u
 #define ANSWER 4u
@@ -63,6 +65,7 @@ static volatile uint32_t millis;
 static uint8_t frame[FRAME];
 static uint32_t frame_bytes;
 static bool answers;
+static bool cut; /* an answer that nobody read: what follows is dropped, up to an end of a line */
 static bool due = true; /* the interval is over, and its reading has not come */
 static unsigned late; /* BOARD_OVERRUN for the sample after one that took too long */
 
@@ -75,10 +78,16 @@ void systick_handler(void)
     millis++;
 }
 
+static bool has_room(const struct uart *uart)
+{
+    return (uart->state & 1u) == 0u;
+}
+
+/* To the converters. Where they take nothing, the watchdog resets. */
 static void send(struct uart *uart, uint32_t byte)
 {
-    while ((uart->state & 1u) != 0u) {
-        /* until there is room */
+    while (!has_room(uart)) {
+        /* until there is */
     }
     uart->data = byte & 255u;
 }
@@ -186,7 +195,18 @@ int board_get(void)
 
 void board_put(char byte)
 {
-    send(LINK, (uint32_t)(unsigned char)byte);
+    const uint32_t begun = millis;
+    if (cut && (byte != '\n')) {
+        return;
+    }
+    while (!has_room(LINK)) {
+        if (cut || ((millis - begun) > LEAVING_MS)) {
+            cut = true;
+            return;
+        }
+    }
+    cut = false;
+    LINK->data = (uint32_t)(unsigned char)byte;
 }
 
 bool board_linked(void)
