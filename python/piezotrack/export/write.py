@@ -33,6 +33,12 @@ FORMS = ("c99", "firmware", "library", "json", "fmu")
 LEFT_OUT = (
     "without the feedforward, whose inverse is no filter: reference= or table= writes it as a table"
 )
+# What takes the place of an online inverse that is too slow.
+REMEDIES = {
+    "c99": "; reference= plays a table in place of the online inverse",
+    "fmu": "; reference= plays a table in place of the online inverse",
+    "firmware": "; without a feedforward it takes voltages from its client as a table",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,7 +219,7 @@ def export_controller(
         texts = sources.files
     bounds = instructions_of(sources, repeats=controller.repetitive is not None)
     if clock is not None:
-        check_clock(bounds, controller.dt, positive("clock", clock, "Hz"))
+        check_clock(bounds, controller.dt, positive("clock", clock, "Hz"), REMEDIES[to])
     files = {key: text.encode() for key, text in texts.items()}
     if to == "fmu":
         files = {names[0]: fmu_bytes(controller, sources)}

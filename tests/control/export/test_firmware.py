@@ -398,8 +398,15 @@ def test_what_cannot_be_a_firmware_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="loaded over its link"):
         export(controller(), tmp_path, to="firmware", table=np.ones(100))
     fast = controller(dt=1e-5, feedforward=DAHL.inverse())
-    with pytest.raises(ParameterError, match="expected a step within 10 us"):
+    with pytest.raises(ParameterError, match="expected a step within 10 us") as refused:
         export(fast, tmp_path, to="firmware", clock=168e6)
+    with pytest.raises(ParameterError, match="reference="):
+        export(fast, tmp_path, to="c99", clock=168e6)
     assert not list(tmp_path.iterdir())
+    # What is suggested is accepted by this form.
+    assert "reference=" not in str(refused.value)
+    export(replace(fast, feedforward=None), tmp_path / "firmware", to="firmware", clock=168e6)
+    motion = pt.sine(frequency=50.0, low=2e-5, high=4e-5, duration=0.04)
+    export(fast, tmp_path / "c99", to="c99", reference=motion, clock=168e6)
     slow = controller(dt=1e-3, feedforward=DAHL.inverse())
     assert export(slow, tmp_path, to="firmware", clock=168e6).most_instructions > 10_000  # type: ignore[operator]
