@@ -24,11 +24,18 @@ needs_cross = pytest.mark.skipif(
     not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
     reason="no board is emulated: arm-none-eabi-gcc or qemu-system-arm is not installed",
 )
+# The same with a timer of their own as the clock.
+TIMED = {f"{name}-timer": machine for name, machine in MACHINES.items()}
 # A process on this computer, always; and boards in QEMU where it is there.
 BOARDS = [
     pytest.param("host", marks=needs_gcc),
-    *(pytest.param(name, marks=[needs_cross, pytest.mark.slow]) for name in MACHINES),
+    *(
+        pytest.param(name, marks=[needs_cross, pytest.mark.slow])
+        for name in (*MACHINES, "m4-timer")
+    ),
 ]
+# Time of an instruction, 64 ns: what a step takes does not depend on how busy the computer is.
+COUNTED = ("-icount", "shift=6")
 # Displacements at both ends of the ADC [m].
 SPAN = (-2e-5, 1.5e-4)
 # On a busy computer a thread may wait for long.
@@ -56,9 +63,14 @@ def booted(
     board: str,
     converters: tuple[str, int],
     *settings: str,
+    emulator: tuple[str, ...] | None = None,
+    link: str = "",
     **options: Any,
 ) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """Export, build and start; the address of the firmware, and its process."""
+    """Export, build and start; the address of the firmware, and its process.
+
+    A board with a timer counts its time in instructions, where the emulator is told nothing else.
+    """
     if not (folder / "Makefile").exists():
         pt.control.export_controller(controller, folder, to="firmware", name="axis", **options)
     made(folder, board)
@@ -69,9 +81,11 @@ def booted(
     else:
         place = f"127.0.0.1:{_free_port()}"
         command = [
-            *("qemu-system-arm", "-M", MACHINES[board], "-nographic", "-monitor", "none"),
+            *("qemu-system-arm", "-M", (MACHINES | TIMED)[board]),
+            *("-nographic", "-monitor", "none"),
+            *(emulator if emulator is not None else COUNTED if board in TIMED else ()),
             *("-kernel", f"axis-{board}.elf"),
-            *("-serial", f"tcp:{place},server=on,wait=off,nodelay=on"),
+            *("-serial", link or f"tcp:{place},server=on,wait=off,nodelay=on"),
             *("-serial", f"tcp:127.0.0.1:{port},nodelay=on"),
         ]
         address = f"firmware://{place}"

@@ -18,7 +18,7 @@ from .c99.sources import c_sources, checked_name
 from .firmware.project import firmware_project, project_files
 from .fmu.unit import compiler, fmu_bytes
 from .json_form import coefficients_document
-from .library import library_sources
+from .library.calls import library_sources
 
 if TYPE_CHECKING:
     import os
@@ -33,6 +33,12 @@ FORMS = ("c99", "firmware", "library", "json", "fmu")
 LEFT_OUT = (
     "without the feedforward, whose inverse is no filter: reference= or table= writes it as a table"
 )
+# What takes the place of an online inverse that is too slow.
+REMEDIES = {
+    "c99": "; reference= plays a table in place of the online inverse",
+    "fmu": "; reference= plays a table in place of the online inverse",
+    "firmware": "; without a feedforward it takes voltages from its client as a table",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,7 +208,8 @@ def export_controller(
                 "given with to='firmware'",
                 "neither: tables are loaded over its link",
             )
-        texts, sources = firmware_project(controller, name, **chosen)
+        project = firmware_project(controller, name, **chosen)
+        texts, sources = project.files, project.controller
     else:
         if to == "fmu":
             compiler()
@@ -212,7 +219,7 @@ def export_controller(
         texts = sources.files
     bounds = instructions_of(sources, repeats=controller.repetitive is not None)
     if clock is not None:
-        check_clock(bounds, controller.dt, positive("clock", clock, "Hz"))
+        check_clock(bounds, controller.dt, positive("clock", clock, "Hz"), REMEDIES[to])
     files = {key: text.encode() for key, text in texts.items()}
     if to == "fmu":
         files = {names[0]: fmu_bytes(controller, sources)}

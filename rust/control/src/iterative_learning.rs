@@ -9,7 +9,8 @@
 //! Tharayil and Alleyne 2006, doi 10.1109/MCS.2006.1636313. The taps come from a model:
 //! `FrequencyRule.taps` in Python, which also tests that the update converges.
 
-use crate::error::{Error, Result, check, finite, usable};
+use crate::Real;
+use crate::error::{Error, Result, check, finite};
 use crate::limits::Limits;
 
 /// Taps on each side of the middle one of Q, at most.
@@ -31,13 +32,13 @@ const HALF: usize = 64;
 /// # Ok::<(), piezotrack_control::Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct IterativeLearning<'a> {
-    learning: &'a [f64],
-    smoothing: &'a [f64],
-    limits: Limits,
+pub struct IterativeLearning<'a, T = f64> {
+    learning: &'a [T],
+    smoothing: &'a [T],
+    limits: Limits<T>,
 }
 
-impl<'a> IterativeLearning<'a> {
+impl<'a, T: Real> IterativeLearning<'a, T> {
     /// An update with the taps of L, V/m, and of Q.
     ///
     /// Both have an odd number of taps, in the order of an impulse response that begins before its
@@ -47,23 +48,26 @@ impl<'a> IterativeLearning<'a> {
     /// # Errors
     /// Names `learning` or `smoothing` where a tap is not finite, their number is even, or Q is
     /// not symmetric, keeps more than all of a constant, or has more than 129 taps.
-    pub fn new(learning: &'a [f64], smoothing: &'a [f64], limits: Limits) -> Result<Self> {
+    pub fn new(learning: &'a [T], smoothing: &'a [T], limits: Limits<T>) -> Result<Self> {
         for (name, taps, most) in
             [("learning", learning, usize::MAX), ("smoothing", smoothing, 2 * HALF + 1)]
         {
             let right = taps.len() % 2 == 1 && taps.len() <= most;
             check(name, length(taps), "taps", right, "an odd number, for smoothing 129 at most")?;
             for &tap in taps {
-                finite(name, tap, if name == "learning" { "V/m" } else { "" })?;
+                finite(name, tap.into(), if name == "learning" { "V/m" } else { "" })?;
             }
         }
         let (ahead, behind) = (smoothing.iter(), smoothing.iter().rev());
         for (&one, &other) in ahead.zip(behind) {
+            let (one, other): (f64, f64) = (one.into(), other.into());
             let right = (one - other).abs() <= 1e-12 * (1.0 + one.abs());
             check("smoothing", one, "", right, "the tap on the other side, for no phase")?;
         }
-        let kept: f64 = smoothing.iter().sum();
-        check("smoothing", kept, "", kept.abs() <= 1.0 + 1e-9, "a sum between -1 and 1")?;
+        let kept: f64 = smoothing.iter().map(|&tap| tap.into()).sum();
+        // Each tap that was rounded is off by half of this at most.
+        let near = 1e-9_f64.max(length(smoothing) * T::EPSILON.into());
+        check("smoothing", kept, "", kept.abs() <= 1.0 + near, "a sum between -1 and 1")?;
         Ok(Self { learning, smoothing, limits })
     }
 
@@ -78,7 +82,7 @@ impl<'a> IterativeLearning<'a> {
     /// # Errors
     /// Names `feedforward` or `error` where its length is not that of the table, and `table` where
     /// that is shorter than Q. The table is unchanged then.
-    pub fn update(&self, table: &mut [f64], feedforward: &[f64], error: &[f64]) -> Result<usize> {
+    pub fn update(&self, table: &mut [T], feedforward: &[T], error: &[T]) -> Result<usize> {
         let count = table.len();
         let text = "as many samples as the table has";
         check("feedforward", length(feedforward), "samples", feedforward.len() == count, text)?;
@@ -88,13 +92,13 @@ impl<'a> IterativeLearning<'a> {
             return Err(Error { name: "table", value, unit: "samples", expected });
         }
         let half = self.smoothing.len() / 2;
-        let base = |k: usize| if usable(feedforward[k]) { feedforward[k] } else { 0.0 };
-        let learnt = |table: &[f64], k: usize| {
+        let base = |k: usize| if feedforward[k].is_usable() { feedforward[k] } else { T::ZERO };
+        let learnt = |table: &[T], k: usize| {
             let one = table[k] - base(k);
-            if usable(one) { one } else { 0.0 }
+            if one.is_usable() { one } else { T::ZERO }
         };
         // Samples that are overwritten before Q has no more use for them.
-        let (mut first, mut before) = ([0.0; HALF], [0.0; HALF]);
+        let (mut first, mut before) = ([T::ZERO; HALF], [T::ZERO; HALF]);
         for i in 0..half {
             first[i] = learnt(table, i);
             before[i] = learnt(table, count - half + i);
@@ -104,27 +108,28 @@ impl<'a> IterativeLearning<'a> {
             let mut sum = self.smoothing[half] * own;
             for i in 1..=half {
                 let later = if k + i < count { learnt(table, k + i) } else { first[k + i - count] };
-                sum += self.smoothing[half + i] * (before[(k + half - i) % half] + later);
+                let both = before[(k + half - i) % half] + later;
+                sum = sum + self.smoothing[half + i] * both;
             }
-            sum += self.learnt_from(error, k);
+            sum = sum + self.learnt_from(error, k);
             if half > 0 {
                 before[k % half] = own;
             }
-            let following = base(k) + if usable(sum) { sum } else { own };
+            let following = base(k) + if sum.is_usable() { sum } else { own };
             table[k] = self.limits.clip(following);
         }
-        Ok(error.iter().filter(|one| !usable(**one)).count())
+        Ok(error.iter().filter(|one| !one.is_usable()).count())
     }
 
     /// Correction that L makes of the errors around sample `k`, V.
-    fn learnt_from(&self, error: &[f64], k: usize) -> f64 {
+    fn learnt_from(&self, error: &[T], k: usize) -> T {
         let (count, half) = (error.len(), self.learning.len() / 2);
         // Tap 0 weighs the sample `half` after this one; L may be longer than the period.
         let mut at = (k + half) % count;
-        let mut sum = 0.0;
-        for tap in self.learning {
-            if usable(error[at]) {
-                sum += tap * error[at];
+        let mut sum = T::ZERO;
+        for &tap in self.learning {
+            if error[at].is_usable() {
+                sum = sum + tap * error[at];
             }
             at = if at == 0 { count - 1 } else { at - 1 };
         }
@@ -134,6 +139,6 @@ impl<'a> IterativeLearning<'a> {
 
 /// Number of entries, for a message.
 #[expect(clippy::cast_precision_loss, reason = "no table has 2^53 samples")]
-fn length(entries: &[f64]) -> f64 {
+fn length<T>(entries: &[T]) -> f64 {
     entries.len() as f64
 }

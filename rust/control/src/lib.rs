@@ -61,8 +61,7 @@
 //! # Ok::<(), piezotrack_control::Error>(())
 //! ```
 //!
-//! In `f64` alone are [`BoucWenInverse`], [`AsymmetricPlayInverse`] and [`IterativeLearning`], which
-//! works between two periods.
+//! In `f64` alone is [`AsymmetricPlayInverse`].
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 

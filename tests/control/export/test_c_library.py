@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import piezotrack as pt
 from c_exports import DAHL, GXX, PARTS, PI, STRICT, checked, compiled, loop, needs_gcc, needs_gxx
 from folders import ROOT
 from piezotrack.errors import ParameterError
+from piezotrack.export.library.calls import library_headers
 
 HEADER = ROOT / "rust" / "capi" / "include"
 RELEASE = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release"
@@ -83,6 +85,22 @@ def test_the_library_gives_the_same_bits(name: str, tmp_path: Path) -> None:
     assert (code, figures["steps"]) == (0, 2000)
     assert figures["largest"] == 0.0
     assert figures["flags"] == 0
+
+
+@needs_gcc
+@needs_library
+def test_the_tree_compiled_as_it_is_gives_the_same_bits(tmp_path: Path) -> None:
+    """Without a word of Python between: the sources and the headers of what was chosen."""
+    one, tree = controller("all"), Path(str(files("piezotrack.export.library"))) / "source"
+    pt.control.export_controller(one, tmp_path, to="library", name="NAME")
+    for ending in ("c", "h"):
+        (tmp_path / f"NAME.{ending}").unlink()
+    for header, text in library_headers(one).items():
+        (tmp_path / header).write_text(text)
+    places = (f"-I{tree}", f"-I{tmp_path}", str(tree / "NAME.c"))
+    compiled(tmp_path, "check.c", flags=(*STRICT, *LINK, *places), libraries=("-lpiezotrack",))
+    code, figures = checked(tmp_path)
+    assert (code, figures["largest"], figures["flags"]) == (0, 0.0, 0)
 
 
 @needs_gcc

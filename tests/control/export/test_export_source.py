@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import zipfile
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -16,9 +18,17 @@ from c_exports import PARTS, PI, STRICT, checked, compiled, learner, loop, needs
 from folders import ROOT
 from piezotrack.export.c99.sources import c_sources
 from piezotrack.export.c99.text import comment_of
+from piezotrack.export.firmware.project import firmware_project
+from piezotrack.export.fmu.unit import unit_header, variables
+from piezotrack.export.library.calls import library_headers
 
 export = pt.control.export_controller
-TREE = Path(str(files("piezotrack.export.c99"))) / "source"
+# The sources of each form; the controller is that of c99 but in the form of a library.
+TREES = {
+    name: Path(str(files(f"piezotrack.export.{name}"))) / "source"
+    for name in ("c99", "firmware", "fmu", "library")
+}
+TREE = TREES["c99"]
 needs_arm = pytest.mark.skipif(
     shutil.which("arm-none-eabi-gcc") is None,
     reason="no cross compiler: arm-none-eabi-gcc is not installed",
@@ -68,6 +78,40 @@ def test_every_file_of_the_tree_is_in_an_export() -> None:
     for name in (*EVERY, "PID", "Dahl"):
         written += c_sources(loop(name), "axis", table=table.get(name)).files["axis.c"]
     assert {one for one in titles if one not in written} == set()
+
+
+def written(headers: dict[str, str], folder: Path) -> tuple[str, ...]:
+    """Write generated headers; the flags that compile a tree with them."""
+    for header, text in headers.items():
+        (folder / header).write_text(text)
+    return (*STRICT, "-Wundef", f"-I{folder}", "-c")
+
+
+@needs_gcc
+@pytest.mark.parametrize("single", [False, True], ids=["double", "float"])
+@pytest.mark.parametrize("name", ["filters and jumps", "Dahl", "nothing"])
+def test_the_tree_of_a_firmware_compiles_as_it_is(name: str, single: bool, tmp_path: Path) -> None:
+    project = firmware_project(replace(loop(name), span=(-2e-5, 1.5e-4)), "axis", single=single)
+    flags = (*written(project.headers, tmp_path), f"-I{TREE}", f"-I{TREES['firmware']}")
+    for file in sorted(TREES["firmware"].glob("*.c")):
+        compiled(tmp_path, str(file), flags=flags)
+    host = str(TREES["firmware"] / "boards" / "host.c")
+    compiled(tmp_path, host, flags=(*flags, "-D_POSIX_C_SOURCE=200809L"))
+
+
+@needs_gcc
+@pytest.mark.parametrize(("name", "table"), [("PID", None), ("PID", [1.0, 2.0]), ("Dahl", None)])
+def test_the_trees_of_unit_and_library_compile_as_they_are(
+    name: str, table: list[float] | None, tmp_path: Path
+) -> None:
+    one = loop(name)
+    sources = c_sources(one, "axis", table=table, fixed=True)
+    unit = unit_header(one.dt, variables(sources.forward, "V")) + '#define UNIT_GUID "0"\n'
+    flags = written(sources.headers | {"unit.h": unit}, tmp_path)
+    compiled(tmp_path, str(TREES["fmu"] / "fmu.c"), flags=(*flags, f"-I{TREE}"))
+    flags = written(library_headers(one, table), tmp_path)
+    header = f"-I{ROOT / 'rust' / 'capi' / 'include'}"
+    compiled(tmp_path, str(TREES["library"] / "NAME.c"), flags=(*flags, header))
 
 
 def test_the_tree_is_in_the_wheel() -> None:
@@ -171,6 +215,23 @@ def test_findings_in_a_firmware_are_those_with_a_reason(file: str, tmp_path: Pat
     others = set(re.findall(r"\[(\w+)\]$", found, re.MULTILINE))
     # One number over itself is what is none.
     assert others <= {"duplicateExpression"}
+
+
+@needs_cppcheck
+@pytest.mark.parametrize("to", ["fmu", "library"])
+def test_findings_in_the_other_forms_are_those_of_their_interfaces(to: Any, tmp_path: Path) -> None:
+    (path, *_) = export(loop("all"), tmp_path, name="axis", to=to).files
+    if to == "fmu":
+        with zipfile.ZipFile(path) as unit:
+            unit.extractall(tmp_path)
+    found = findings(tmp_path, "sources/fmu.c" if to == "fmu" else "axis.c")
+    rules = set(re.findall(r"misra-c2012-([\d.]+)", found))
+    # FMI has no prototypes of a header, arguments that nobody uses, and instances behind void *.
+    more = {"2.5", "2.7", "8.4", "11.5", "20.7"} if to == "fmu" else set()
+    assert "15.5" in rules
+    assert rules <= accepted("export.md") | more
+    others = set(re.findall(r"\[(\w+)\]$", found, re.MULTILINE))
+    assert others <= {"unusedStructMember"}
 
 
 # Texts of the user's file.

@@ -339,6 +339,55 @@ def test_gains_change_while_it_runs_as_those_of_a_session(
 
 
 @needs_gcc
+def test_a_log_of_a_recording_that_goes_on_has_no_gap(
+    tmp_path: Path, stage: pt.hardware.Converters, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with booted(controller(), tmp_path, "host", stage.address) as (address, _):
+        device = connected(address)
+        line = device._line
+        device.follow(4e-5)
+        assert within(lambda: device.state().recorded > 5000)
+        ask, meanwhile, restarts = line.ask, 300, False
+
+        def later(message: str) -> str:
+            """Let samples pass before each answer."""
+            if message.startswith("read"):
+                if restarts:
+                    ask("follow 5e-5")
+                before = 0 if restarts else device.state().recorded
+                while device.state().recorded <= before + meanwhile:
+                    pass
+            return ask(message)
+
+        monkeypatch.setattr(line, "ask", later)
+        state = device.state()
+        rows = line.newest(state.recorded)
+        # As far back as they are there while 428 of 4096 places are used for 128 samples.
+        assert 128 <= len(rows) < 4096 - meanwhile
+        assert np.array_equal(np.diff(rows[:, 0]), np.ones(len(rows) - 1))
+        assert 0 <= rows[-1, 0] - state.tick < 100
+        meanwhile = 4200
+        with pytest.raises(pt.DeviceError, match="written over"):
+            device.log()
+        # A recording that begins anew is another one.
+        meanwhile, restarts = 3000, True
+        rows = line.newest(3000)
+        assert len(rows) <= 128
+        monkeypatch.undo()
+        assert within(lambda: device.state().recorded > 4500)
+        device.stop()
+        ended = device.state()
+        assert ended.recorded > 4096
+        whole = line.newest(ended.recorded)
+        assert len(whole) == 4096
+        assert np.array_equal(np.diff(whole[:, 0]), np.ones(4095))
+        log = device.log()
+        assert np.array_equal(log.u, whole[:, 3])
+        assert np.array_equal(log.recorded, whole[:, 4])
+        device.close()
+
+
+@needs_gcc
 def test_a_limit_that_a_float_cannot_have_is_reached(
     tmp_path: Path, stage: pt.hardware.Converters
 ) -> None:
@@ -398,8 +447,15 @@ def test_what_cannot_be_a_firmware_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="loaded over its link"):
         export(controller(), tmp_path, to="firmware", table=np.ones(100))
     fast = controller(dt=1e-5, feedforward=DAHL.inverse())
-    with pytest.raises(ParameterError, match="expected a step within 10 us"):
+    with pytest.raises(ParameterError, match="expected a step within 10 us") as refused:
         export(fast, tmp_path, to="firmware", clock=168e6)
+    with pytest.raises(ParameterError, match="reference="):
+        export(fast, tmp_path, to="c99", clock=168e6)
     assert not list(tmp_path.iterdir())
+    # What is suggested is accepted by this form.
+    assert "reference=" not in str(refused.value)
+    export(replace(fast, feedforward=None), tmp_path / "firmware", to="firmware", clock=168e6)
+    motion = pt.sine(frequency=50.0, low=2e-5, high=4e-5, duration=0.04)
+    export(fast, tmp_path / "c99", to="c99", reference=motion, clock=168e6)
     slow = controller(dt=1e-3, feedforward=DAHL.inverse())
     assert export(slow, tmp_path, to="firmware", clock=168e6).most_instructions > 10_000  # type: ignore[operator]

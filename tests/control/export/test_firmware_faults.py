@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from boards import MACHINES, booted, connected, controller, needs_cross, within
+from boards import MACHINES, TIMED, booted, connected, controller, needs_cross, within
 from c_exports import needs_gcc
 
 if TYPE_CHECKING:
@@ -126,6 +126,48 @@ def test_samples_that_do_not_come_are_a_fault(tmp_path: Path) -> None:
 
 @needs_cross
 @pytest.mark.slow
+def test_the_timer_of_a_board_is_its_clock(tmp_path: Path, stage: pt.hardware.Converters) -> None:
+    """However fast the converters answer: they would give a thousand samples a second and more."""
+    one = controller(dt=0.02, feedback=pt.Pid.from_um(kp=0.02, ti=0.05), filters=[])
+    with booted(one, tmp_path, "m4-timer", stage.address, emulator=()) as (address, _):
+        device = connected(address)
+        before, first = time.monotonic(), device.state().tick
+        assert within(lambda: device.state().tick >= first + 40)
+        last, after = device.state().tick, time.monotonic()
+        device.close()
+    # Where the computer is busy, it waits for them.
+    assert (last - first - 2) * one.dt <= after - before
+
+
+@needs_cross
+@pytest.mark.slow
+@pytest.mark.parametrize("board", TIMED)
+def test_a_step_that_lasts_longer_than_its_interval_is_an_overrun(
+    board: str, tmp_path: Path, stage: pt.hardware.Converters
+) -> None:
+    one = controller()
+    pt.control.export_controller(one, tmp_path, to="firmware", name="axis")
+    # Above 60 um a step has 20000 instructions more, which take 1.28 ms; below a tenth of them.
+    source = tmp_path / "firmware.c"
+    wait = "for (volatile int i = constant > (real)6e-5 ? 6000 : 600; i > 0; i--) {\n}\n"
+    text = source.read_text()
+    assert text.count("case MODE_RUN:\n") == 1
+    source.write_text(text.replace("case MODE_RUN:\n", f"case MODE_RUN:\n{wait}"))
+    with booted(one, tmp_path, board, stage.address) as (address, _):
+        device = connected(address)
+        device.follow(4e-5)
+        assert within(lambda: device.state().recorded > 300)
+        assert device.state().overruns == 0
+        device._line.ask("follow 7e-5")
+        assert within(lambda: device.state().fault == "overrun")
+        assert within(lambda: stage.voltage == SAFE)
+        # On the way there the steps are short again.
+        assert device.state().overruns < 6
+        device.close()
+
+
+@needs_cross
+@pytest.mark.slow
 @pytest.mark.parametrize("board", MACHINES)
 def test_the_watchdog_resets_a_processor_that_hangs(board: str, tmp_path: Path) -> None:
     one = controller()
@@ -222,6 +264,41 @@ def test_a_client_that_does_not_read_is_hung_up_on(
                 for _ in range(100_000):
                     link.sendall(b"read 0 256\n")
             assert within(lambda: stage.voltage == SAFE)
+
+
+@needs_cross
+@pytest.mark.slow
+def test_answers_that_a_client_does_not_read_do_not_stop_a_board(tmp_path: Path) -> None:
+    """What does not leave is dropped, a line is never a mixture of two, and sampling goes on."""
+    one, path = controller(), tmp_path / "link"
+    place = f"unix:{path.name},server=on,wait=off"
+    with (
+        Clock(one) as clock,
+        booted(one, tmp_path, "m4", clock.address, link=place),
+        socket.socket(socket.AF_UNIX) as link,
+    ):
+        assert within(path.exists)
+        link.connect(str(path))
+        link.settimeout(20.0)
+        link.sendall(b"hold 60\n")
+        # Few bytes find room. Longer than twice the time of the watchdog nobody reads.
+        for _ in range(50):
+            link.sendall(b"id\n")
+            time.sleep(0.1)
+        received = b""
+        while select.select([link], [], [], 1.0)[0]:
+            received += link.recv(2**16)
+        # The first command ends the line that was cut.
+        link.sendall(b"ping\nstate\n")
+        while b"fault=" not in received or not received.endswith(b"\n"):
+            received += link.recv(2**16)
+        assert clock.volts[-1] == pytest.approx(60.0, abs=1e-3)
+    answers = received.decode().splitlines()
+    assert answers[0] == "ok"
+    assert answers[-1].startswith("ok hold fault=none")
+    assert len(answers) < 40
+    # Of two answers there is no mixture.
+    assert all(line.startswith("ok") and line.count("ok") == 1 for line in answers)
 
 
 @needs_gcc

@@ -2,16 +2,16 @@
 //! reaches is what they call.
 
 use piezotrack_control::disturbance_observer::Observed;
-use piezotrack_control::hysteresis::{BoucWen, Dahl, LuGre, Play};
+use piezotrack_control::hysteresis::{AsymmetricBoucWen, BoucWen, Dahl, LuGre, Play};
 use piezotrack_control::inverse::{NetworkNumbers, NeuralNetworkInverse};
 use piezotrack_control::unfused::Unfused;
 use piezotrack_control::{
-    Cast, Creep, CreepingInverse, DahlInverse, Damped, DisturbanceObserver, Dynamics, Feedback,
-    FeedbackSample, FirstOrderDahlInverse, HysteresisObserved, HysteresisObserver,
-    IntegralResonantControl, Inverse, LeadLag, Limits, LuGreInverse, OnlineFeedforward,
-    OnlineFeedforwardState, OscillatorInverse, ParallelDahlInverse, Pid, PrandtlIshlinskiiInverse,
-    ReferenceSample, Result, SampledDahlInverse, SampledPid, SampledSlidingMode, ScheduledPid,
-    SlidingMode, StateSpace,
+    AsymmetricBoucWenInverse, BoucWenInverse, Cast, Creep, CreepingInverse, DahlInverse, Damped,
+    DisturbanceObserver, Dynamics, Feedback, FeedbackSample, FirstOrderDahlInverse,
+    HysteresisObserved, HysteresisObserver, IntegralResonantControl, Inverse, LeadLag, Limits,
+    LuGreInverse, OnlineFeedforward, OnlineFeedforwardState, OscillatorInverse,
+    ParallelDahlInverse, Pid, PrandtlIshlinskiiInverse, ReferenceSample, Result,
+    SampledDahlInverse, SampledPid, SampledSlidingMode, ScheduledPid, SlidingMode, StateSpace,
 };
 
 const DT: f64 = 1e-3;
@@ -69,6 +69,8 @@ struct Parts {
     parallel: Ahead<ParallelDahlInverse<f32>>,
     oscillator: Ahead<OscillatorInverse<f32>>,
     lugre: Ahead<LuGreInverse<f32>>,
+    bouc_wen: Ahead<BoucWenInverse<BoucWen<Single>, Single>>,
+    asymmetric: Ahead<BoucWenInverse<AsymmetricBoucWen<Single>, Single>>,
     network: Ahead<NeuralNetworkInverse<f32>>,
 }
 
@@ -155,6 +157,12 @@ fn parts() -> Result<Parts> {
             DT,
         )?)?,
         lugre: Ahead::new(LuGreInverse::new([stage.0, stage.1, stage.2], stage.3, &lugre, DT)?)?,
+        bouc_wen: Ahead::new(BoucWenInverse::new(0.01, 5.0, 1e5, 1e-6, 0.3, 0.06, 0.04, 1.5)?)?,
+        asymmetric: Ahead::new(AsymmetricBoucWenInverse::asymmetric(
+            [0.01, 5.0, 1e5, 1e-6],
+            0.3,
+            [0.06, 0.04, 0.01, 0.005],
+        )?)?,
         network: Ahead::new(network)?,
     })
 }
@@ -193,5 +201,7 @@ pub extern "C" fn parts_volts(reference: f32, measured: f32) -> f32 {
         + parts.parallel.step(&ahead, limits)
         + parts.oscillator.step(&ahead, limits)
         + parts.lugre.step(&ahead, limits)
+        + parts.bouc_wen.step(&ahead, limits)
+        + parts.asymmetric.step(&ahead, limits)
         + parts.network.step(&ahead, limits)
 }

@@ -1,9 +1,9 @@
 //! Iterative learning between periods, against a direct transcription and on a stage that is late.
-#![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::float_cmp, clippy::cast_possible_truncation)]
 
 use core::f64::consts::TAU;
 
-use piezotrack_control::{IterativeLearning, Limits};
+use piezotrack_control::{Cast, IterativeLearning, Limits};
 use proptest::prelude::*;
 
 const WIDE: (f64, f64) = (-1e6, 1e6);
@@ -126,4 +126,35 @@ fn what_cannot_be_used_is_refused_by_name() {
     assert_eq!(rule.update(&mut [1.0; 2], &[0.0; 2], &[0.0; 2]).unwrap_err().name, "table");
     assert_eq!(rule.update(&mut [], &[], &[]).unwrap_err().name, "table");
     assert_eq!(table, [1.0; 4]);
+}
+
+/// A period adds the roundings of its sums: two of the table and its differences, eight of what is
+/// learnt and seven of the correction; Q keeps no more than all of those before.
+#[test]
+fn a_table_in_single_precision_differs_by_the_roundings_of_its_periods() {
+    const PERIODS: u32 = 4;
+    let rounding = 0.5 * f64::from(f32::EPSILON);
+    let (learning, smoothing) = ([0.5e6, 0.2e6, -0.1e6], [0.25, 0.5, 0.25]);
+    let wide = limits((0.0, 75.0));
+    let rule = IterativeLearning::new(&learning, &smoothing, wide).unwrap();
+    let taps = (learning.map(|tap| tap as f32), smoothing.map(|tap| tap as f32));
+    let single = IterativeLearning::new(&taps.0, &taps.1, wide.cast::<f32>().unwrap()).unwrap();
+    let times: Vec<f64> = (0_u32..40).map(f64::from).collect();
+    let forward: Vec<f64> = times.iter().map(|k| 30.0 + 20.0 * (0.157 * k).sin()).collect();
+    let mut error: Vec<f64> = times.iter().map(|k| 4e-6 * (0.3 * k).cos()).collect();
+    error[7] = f64::NAN;
+    let rounded = |values: &[f64]| values.iter().map(|&one| one as f32).collect::<Vec<f32>>();
+    let (given, off) = (rounded(&forward), rounded(&error));
+    let (mut table, mut other) = (forward.clone(), given.clone());
+    for _ in 0..PERIODS {
+        assert_eq!(rule.update(&mut table, &forward, &error).unwrap(), 1);
+        assert_eq!(single.update(&mut other, &given, &off).unwrap(), 1);
+    }
+    let most = |values: &mut dyn Iterator<Item = f64>| values.map(f64::abs).fold(0.0, f64::max);
+    let learnt = most(&mut table.iter().zip(&forward).map(|(one, of)| one - of));
+    assert!(learnt > 5.0, "{learnt}");
+    let found = most(&mut table.iter().zip(&other).map(|(one, other)| one - f64::from(*other)));
+    let sample = rounding * (2.0 * 75.0 + 8.0 * learnt + 7.0 * 0.8e6 * 4e-6);
+    let bound = f64::from(PERIODS) * sample;
+    assert!(found > 0.0 && found < bound, "{found} V of {bound} V");
 }

@@ -285,23 +285,23 @@ class FirmwareDevice:
         self._line.ask("save")
 
     def log(self) -> Dataset:
-        """Return the newest samples that the board has kept, as a log."""
+        """Return the newest samples that the board has kept, as a log.
+
+        Of a recording that goes on these are the samples before this call without a gap; those that
+        it wrote over while they were read are missing at the beginning.
+        """
         recorded = self.state().recorded
         if recorded < MIN_SAMPLES:
             raise DeviceError(
                 f"{self.channels[0]} has recorded {recorded} samples: expected at least "
                 f"{MIN_SAMPLES}"
             )
-        count = min(recorded, self.memory)
-        while True:
-            try:
-                rows = self._line.recorded(count, recorded - count)
-                break
-            except DeviceError:
-                # Older ones were overwritten meanwhile: fewer of the newest.
-                recorded, count = self.state().recorded, count // 2
-                if count < MIN_SAMPLES:
-                    raise
+        rows = self._line.newest(recorded)
+        if len(rows) < MIN_SAMPLES:
+            raise DeviceError(
+                f"{self.channels[0]} has written over its record while it was read: expected one "
+                "that has ended, as after stop()"
+            )
         return Dataset(
             u=rows[:, 3],
             y=rows[:, 4],

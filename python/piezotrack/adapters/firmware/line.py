@@ -220,24 +220,50 @@ class BoardLine:
                 )
             time.sleep(GLANCE)
 
-    def recorded(self, count: int, first: int = 0) -> Array:
-        """Read samples: tick, flags, reference, voltage, reading."""
+    def recorded(self, count: int) -> Array:
+        """Read the first samples: tick, flags, reference, voltage, reading."""
         rows: list[Sequence[float]] = []
         while len(rows) < count:
-            wanted = min(SAMPLES, count - len(rows))
-            message = f"read {first + len(rows)} {wanted}"
-            answer = self.ask(message)
-            try:
-                more = [
-                    (float(tick), float(flags), *map(self.number, numbers))
-                    for tick, flags, *numbers in (word.split(":") for word in answer.split())
-                ]
-            except (ValueError, struct.error):
-                raise self.unexpected(message, answer) from None
-            if not more or any(len(row) != 5 for row in more):
-                raise self.unexpected(message, answer)
+            more = self._samples(len(rows), min(SAMPLES, count - len(rows)))
+            if not more:
+                raise DeviceError(
+                    f"{self.name} does not have sample {len(rows)} of its record any more"
+                )
             rows += more
         return np.array(rows, dtype=np.float64).reshape(-1, 5)
+
+    def newest(self, recorded: int) -> Array:
+        """Read the samples before one, as far back as they are there without a gap.
+
+        From the newest to the oldest: of a recording that goes on, these are written over first.
+        """
+        rows: list[Sequence[float]] = []
+        first, count = recorded, SAMPLES
+        while count > 0 and first > 0:
+            count = min(count, first)
+            more = self._samples(first - count, count)
+            if len(more) < count:
+                count //= 2
+                continue
+            if rows and more[-1][0] >= rows[0][0]:
+                break  # of a recording that has begun since
+            rows, first = more + rows, first - count
+        return np.array(rows, dtype=np.float64).reshape(-1, 5)
+
+    def _samples(self, first: int, count: int) -> list[Sequence[float]]:
+        """Ask for samples; those up to the first that is not there any more."""
+        message = f"read {first} {count}"
+        answer = self.ask(message)
+        try:
+            rows = [
+                (float(tick), float(flags), *map(self.number, numbers))
+                for tick, flags, *numbers in (word.split(":") for word in answer.split())
+            ]
+        except (ValueError, struct.error):
+            raise self.unexpected(message, answer) from None
+        if len(rows) > count or any(len(row) != 5 for row in rows):
+            raise self.unexpected(message, answer)
+        return [*rows]
 
     def bits(self, value: float) -> str:
         """Write the bits of a number as the board reads them."""

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .tree import choices_of, joined
+from .tree import choices_of, filled, joined
 
-__all__ = ["Loop", "check_code"]
+__all__ = ["FORWARD", "Loop", "check_code"]
 
+# Choices of the tree, by where the feedforward comes from.
 FORWARD = {"given": (), "table": ("FORWARD_TABLE",), "online": ("FORWARD_ONLINE",)}
-
-
-CLOSED_TEXT = """\
- * The loop is closed around the stage of the vectors, a lag: an observer around an integral would
- * add up twice what floats leave out, where no reading answers."""
 
 
 class Loop(NamedTuple):
@@ -70,5 +66,4 @@ def check_code(
             f"#define STAGE_HIGH {closed.high!r} /* highest one */\n"
         )
     code = joined("check.c", choices_of(chosen), {"bounds.h": bounds})
-    code = code.replace("@closed\n", "" if closed is None else f"{CLOSED_TEXT}\n")
-    return code.replace("@flags", str(flags)).replace("@link", link)
+    return filled(code, {"@flags": str(flags), "@link": link})

@@ -54,8 +54,19 @@ def instructions_of(sources: Sources, *, repeats: bool) -> Instructions:
     return Instructions(usual, usual + online * EVALUATIONS * EVALUATION)
 
 
-def check_clock(instructions: Instructions, dt: float, clock: float) -> None:
+def check_clock(instructions: Instructions, dt: float, clock: float, remedy: str) -> None:
     """Refuse a step that does not fit its interval, at an instruction a cycle.
+
+    Parameters
+    ----------
+    instructions : Instructions
+        Bounds of a step.
+    dt : float
+        Interval [s].
+    clock : float
+        Clock of the processor [Hz].
+    remedy : str
+        What this form accepts in place of an online inverse.
 
     Raises
     ------
@@ -64,16 +75,14 @@ def check_clock(instructions: Instructions, dt: float, clock: float) -> None:
 
     Examples
     --------
-    >>> check_clock(Instructions(200, 200), dt=1e-5, clock=168e6)
+    >>> check_clock(Instructions(200, 200), dt=1e-5, clock=168e6, remedy="")
     """
     taken = instructions.most / clock
     if taken > dt:
-        remedy = ""
-        if instructions.most > instructions.usual:
-            remedy = "; reference= plays a table in place of the online inverse"
+        online = instructions.most > instructions.usual
         raise ParameterError(
             "clock",
             f"{1e-6 * clock:g} MHz, at which {instructions.most} instructions take "
             f"{1e6 * taken:.3g} us",
-            f"a step within {1e6 * dt:.3g} us{remedy}",
+            f"a step within {1e6 * dt:.3g} us{remedy * online}",
         )

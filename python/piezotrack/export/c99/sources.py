@@ -27,7 +27,7 @@ from .text import (
     size_text,
     state_bytes,
 )
-from .tree import choices_of, choices_text, joined
+from .tree import choices_of, choices_text, filled, joined
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -178,9 +178,9 @@ def c_sources(
         "@ranges": _ranges(controller, unit),
         "@unit": unit,
     }
-    texts = {f"{name}.{end}": joined(f"NAME.{end}", choices, given) for end in ("h", "c")}
-    for key, piece in pieces.items():
-        texts = {file: text.replace(key, piece) for file, text in texts.items()}
+    texts = {
+        f"{name}.{end}": filled(joined(f"NAME.{end}", choices, given), pieces) for end in ("h", "c")
+    }
     closed = None
     if single and shape.law in OBSERVERS:
         stage = stage_of(controller)

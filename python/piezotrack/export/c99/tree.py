@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from importlib.resources.abc import Traversable
 
-__all__ = ["CHOICES", "choices_of", "choices_text", "joined"]
+__all__ = ["CHOICES", "choices_of", "choices_text", "filled", "joined", "source_of"]
 
 # What `#if` in the tree asks for: each is 0 or 1.
 CHOICES = (
@@ -26,13 +26,15 @@ DIRECTIVE = re.compile(r"#(ifdef|ifndef|if|elif|else|endif)\b(.*)")
 INCLUDE = re.compile(r'#include "(.*)"')
 
 
+def source_of(package: str) -> Traversable:
+    """Return the folder with the C sources of a package."""
+    return files(package).joinpath("source")
+
+
 @cache
-def _text(file: str) -> str:
-    """Read a file of the tree."""
-    place: Traversable = files(__package__).joinpath("source")
-    for part in file.split("/"):
-        place = place.joinpath(part)
-    return place.read_text(encoding="utf-8")
+def _text(package: str, file: str) -> str:
+    """Read a file of a tree."""
+    return source_of(package).joinpath(*file.split("/")).read_text(encoding="utf-8")
 
 
 def choices_of(chosen: Iterable[str]) -> dict[str, bool]:
@@ -47,7 +49,19 @@ def choices_text(choices: Mapping[str, bool]) -> str:
     return "".join(f"#define {name} {int(value)}\n" for name, value in choices.items())
 
 
-def joined(file: str, choices: Mapping[str, bool], given: Mapping[str, str]) -> str:
+def filled(text: str, pieces: Mapping[str, str]) -> str:
+    """Put pieces in the places of their keys."""
+    for key, piece in pieces.items():
+        text = text.replace(key, piece)
+    return text
+
+
+def joined(
+    file: str,
+    choices: Mapping[str, bool],
+    given: Mapping[str, str],
+    package: str = __package__,
+) -> str:
     """Join a file of the tree with those that it includes, for some choices.
 
     Parameters
@@ -57,8 +71,10 @@ def joined(file: str, choices: Mapping[str, bool], given: Mapping[str, str]) -> 
     choices : mapping
         Values of the choices; the other conditions stay.
     given : mapping
-        Texts for files that are not in the tree; for a file of the tree, what comes below its
-        title.
+        Texts for headers that are not in the tree; for a file of the tree, what comes below its
+        title. Other headers stay included.
+    package : str, optional
+        Package of the tree.
 
     Returns
     -------
@@ -66,19 +82,17 @@ def joined(file: str, choices: Mapping[str, bool], given: Mapping[str, str]) -> 
         The text, without the conditions and inclusions that are decided.
     """
     lines: list[str] = []
-    for line in _resolved(_text(file).splitlines(), choices):
+    for line in _resolved(_text(package, file).splitlines(), choices):
         included = INCLUDE.fullmatch(line)
         name = included[1] if included else ""
-        if included is None or name == "NAME.h":
-            lines.append(line)
-        elif name in CHOSEN:
+        if name in CHOSEN:
             continue
-        elif not name.endswith(".c"):
-            lines += given[name].splitlines()
-        else:
-            title, *rest = joined(name, choices, given).splitlines()
+        if name.endswith(".c"):
+            title, *rest = joined(name, choices, given, package).splitlines()
             lines += [title, *([""] if given.get(name) else []), *given.get(name, "").splitlines()]
             lines += rest
+        else:
+            lines += given[name].splitlines() if name in given else [line]
     text = re.sub(r"\n{3,}", "\n\n", "\n".join(lines))
     return re.sub(r"\{\n\n", "{\n", text).strip("\n") + "\n"
 

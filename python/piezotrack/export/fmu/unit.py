@@ -17,22 +17,30 @@ from xml.sax.saxutils import quoteattr
 from ... import _core
 from ..._support.messages import quoted
 from ...errors import DataError, ParameterError
-from ..c99.text import named
-from .functions import FMU_CODE, FORWARD_INPUT
+from ..c99.check import FORWARD
+from ..c99.text import named_in
+from ..c99.tree import choices_of, joined
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ...control.controller.controller import Controller
     from ..c99.sources import Sources
 
-__all__ = ["FLAGS", "compiler", "fmu_bytes"]
+__all__ = ["FLAGS", "compiler", "fmu_bytes", "unit_header"]
 
 # Without fused multiply-add: the same bits as of the Rust controller.
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC", "-shared")
 # As of all archives that are to be the same for the same controller.
 LONG_AGO = (1980, 1, 1, 0, 0, 0)
 LONGEST_COMPILATION = 120.0
-# Value references from here on are truth values.
-FLAGS_FROM = 10
+# Value references from here on are outputs, and truth values among them.
+OUTPUTS_FROM, FLAGS_FROM = 4, 10
+# The third input, by where the feedforward comes from.
+FORWARD_INPUT = {
+    "given": ("feedforward", "Feedforward of your own, 0 for none"),
+    "online": ("next", "Desired displacement one step later"),
+}
 
 
 class Variable(NamedTuple):
@@ -46,7 +54,7 @@ class Variable(NamedTuple):
 
 
 def variables(forward: str, unit: str) -> list[Variable]:
-    """List the variables; `functions` has the same value references."""
+    """List the variables; the C has their value references from `unit_header`."""
     third = []
     if forward in FORWARD_INPUT:
         name, text = FORWARD_INPUT[forward]
@@ -128,10 +136,13 @@ def fmu_bytes(controller: Controller, sources: Sources) -> bytes:
     """
     name, unit = sources.name, controller.drive_unit
     code = {key: text for key, text in sources.files.items() if key in (f"{name}.c", f"{name}.h")}
-    wrapper = FMU_CODE.replace("@dt", float(controller.dt).hex()).replace("@file", name)
-    wrapper = wrapper.replace("@call", CALLS[sources.forward])
-    digest = hashlib.sha256("".join((*code.values(), wrapper)).encode()).hexdigest()
-    code["fmu.c"] = named(name, wrapper.replace("@guid", digest))
+    header = unit_header(controller.dt, variables(sources.forward, unit))
+    digest = hashlib.sha256("".join((*code.values(), header)).encode()).hexdigest()
+    header += f'#define UNIT_GUID "{digest}"\n'
+    functions = joined(
+        "fmu.c", choices_of(FORWARD[sources.forward]), {"unit.h": header}, package=__package__
+    )
+    code["fmu.c"] = named_in(name, functions)
     files = {"modelDescription.xml": _description(controller, sources, digest, unit).encode()}
     files |= {f"sources/{key}": text.encode() for key, text in code.items()}
     files[f"binaries/linux64/{name}.so"] = _binary(name, code)
@@ -142,11 +153,12 @@ def fmu_bytes(controller: Controller, sources: Sources) -> bytes:
     return archive.getvalue()
 
 
-CALLS = {
-    "given": "NAME_step(&unit->state, (NAME_real)in[0], (NAME_real)in[1], (NAME_real)in[2]);",
-    "table": "NAME_step(&unit->state, (NAME_real)in[0], (NAME_real)in[1]);",
-    "online": "NAME_step(&unit->state, (NAME_real)in[0], (NAME_real)in[2], (NAME_real)in[1]);",
-}
+def unit_header(dt: float, listed: Sequence[Variable]) -> str:
+    """Write interval, counts and value references for the C, without the identifier."""
+    lines = [f"UNIT_INTERVAL {float(dt).hex()} /* of a sample, s */"]
+    lines += [f"UNIT_INPUTS {OUTPUTS_FROM}u", "UNIT_NO_REPORT 1e300"]
+    lines += [f"UNIT_{one.name.upper()} {one.number}u /* {one.text} */" for one in listed]
+    return "".join(f"#define {line}\n" for line in lines)
 
 
 def _binary(name: str, code: dict[str, str]) -> bytes:

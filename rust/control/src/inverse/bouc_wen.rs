@@ -10,8 +10,44 @@
 //! to be monotone.
 
 use super::Inverse;
-use crate::error::{Result, check, finite, not_negative, positive, usable};
+use crate::cast::{Cast, rounded};
+use crate::error::{Result, check, finite, not_negative, positive};
 use crate::hysteresis::{AsymmetricBoucWen, BoucWen, BoucWenState, Operator};
+use crate::unfused::Unfused;
+use crate::{Number, Real};
+
+/// A number of one lane: a real number, with fused multiply-add or without.
+pub trait Scalar: Number {
+    /// The number with this value.
+    fn scalar(value: Self::Lane) -> Self;
+
+    /// Its value.
+    fn value(self) -> Self::Lane;
+}
+
+impl<T: Real> Scalar for T {
+    #[inline(always)]
+    fn scalar(value: T) -> T {
+        value
+    }
+
+    #[inline(always)]
+    fn value(self) -> T {
+        self
+    }
+}
+
+impl<T: Real> Scalar for Unfused<T> {
+    #[inline(always)]
+    fn scalar(value: T) -> Self {
+        Self(value)
+    }
+
+    #[inline(always)]
+    fn value(self) -> T {
+        self.0
+    }
+}
 
 /// Parameters of the inverse of a Bouc-Wen stage.
 ///
@@ -22,17 +58,19 @@ use crate::hysteresis::{AsymmetricBoucWen, BoucWen, BoucWenState, Operator};
 /// | `alpha` | alpha | 1 | below 1, and see [`BoucWenInverse::new`] |
 /// | `beta`, `gamma` | beta, gamma | 1/(V m^(n-1)) | beta + gamma >= 0, beta >= gamma |
 /// | `exponent` | n | 1 | >= 1 |
+///
+/// Computed in `f64` with fused multiply-add; [`Cast::cast`] makes one without, in any real type.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoucWenInverse<O = BoucWen<f64>> {
-    mass: f64,
-    damping: f64,
-    stiffness: f64,
-    piezo_coefficient: f64,
+pub struct BoucWenInverse<O = BoucWen<f64>, N: Number = f64> {
+    mass: N::Lane,
+    damping: N::Lane,
+    stiffness: N::Lane,
+    piezo_coefficient: N::Lane,
     operator: O,
 }
 
 /// Inverse of an asymmetric Bouc-Wen stage.
-pub type AsymmetricBoucWenInverse = BoucWenInverse<AsymmetricBoucWen<f64>>;
+pub type AsymmetricBoucWenInverse<N = f64> = BoucWenInverse<AsymmetricBoucWen<N>, N>;
 
 impl BoucWenInverse {
     /// The inverse of the stage with these parameters, in SI units.
@@ -126,11 +164,52 @@ impl<O: Operator<f64, State = BoucWenState<f64>>> BoucWenInverse<O> {
             operator,
         })
     }
+}
 
+impl<O> BoucWenInverse<O> {
+    fn rounded<T: Real, P>(&self, operator: P) -> Result<BoucWenInverse<P, Unfused<T>>> {
+        Ok(BoucWenInverse {
+            mass: rounded("mass", self.mass, "kg")?,
+            damping: rounded("damping", self.damping, "N s/m")?,
+            stiffness: rounded("stiffness", self.stiffness, "N/m")?,
+            piezo_coefficient: rounded("piezo_coefficient", self.piezo_coefficient, "m/V")?,
+            operator,
+        })
+    }
+}
+
+/// Without fused multiply-add.
+impl Cast for BoucWenInverse {
+    type In<T: Real> = BoucWenInverse<BoucWen<Unfused<T>>, Unfused<T>>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        let BoucWen { rise, beta, gamma, exponent } = self.operator;
+        let [rise, beta, gamma] = [rise, beta, gamma].map(Unfused);
+        self.rounded(BoucWen { rise, beta, gamma, exponent }.cast()?)
+    }
+}
+
+/// Without fused multiply-add.
+impl Cast for AsymmetricBoucWenInverse {
+    type In<T: Real> = AsymmetricBoucWenInverse<Unfused<T>>;
+
+    fn cast<T: Real>(&self) -> Result<Self::In<T>> {
+        let of = |name, value| Ok(Unfused(rounded(name, value, "")?));
+        self.rounded(AsymmetricBoucWen {
+            rise: of("alpha", self.operator.rise)?,
+            beta: of("beta", self.operator.beta)?,
+            gamma: of("gamma", self.operator.gamma)?,
+            asymmetry: of("asymmetry", self.operator.asymmetry)?,
+            sign_asymmetry: of("sign_asymmetry", self.operator.sign_asymmetry)?,
+        })
+    }
+}
+
+impl<N: Scalar, O: Operator<N, State = BoucWenState<N>>> BoucWenInverse<O, N> {
     /// The state for a stage at rest that never moved.
     #[must_use]
-    pub fn rest(&self) -> BoucWenInverseState {
-        BoucWenInverseState { u: 0.0, memory: self.operator.rest() }
+    pub fn rest(&self) -> BoucWenInverseState<N> {
+        BoucWenInverseState { u: N::scalar(N::Lane::ZERO), memory: self.operator.rest() }
     }
 
     /// The voltage for displacement `x` (m), velocity `v` (m/s) and acceleration `a` (m/s^2) of
@@ -139,45 +218,55 @@ impl<O: Operator<f64, State = BoucWenState<f64>>> BoucWenInverse<O> {
     /// NaN, with the state unchanged, where an input is not finite (or beyond 1e100), the
     /// iteration did not converge or the voltage is not finite; a controller holds its feedforward then.
     #[inline]
-    pub fn step(&self, state: &mut BoucWenInverseState, x: f64, v: f64, a: f64) -> f64 {
-        if !(usable(x) && usable(v) && usable(a)) {
-            return f64::NAN;
+    pub fn step(
+        &self,
+        state: &mut BoucWenInverseState<N>,
+        x: N::Lane,
+        v: N::Lane,
+        a: N::Lane,
+    ) -> N::Lane {
+        if !(x.is_usable() && v.is_usable() && a.is_usable()) {
+            return N::Lane::NAN;
         }
+        let (zero, one) = (N::Lane::ZERO, N::Lane::of(1.0));
+        let near = N::Lane::of(1e-15).larger(N::Lane::of(4.0) * N::Lane::EPSILON);
+        let (last, value) = (state.u.value(), state.memory.value.value());
         let d = self.piezo_coefficient;
         let wanted = (self.mass * a + self.damping * v) / self.stiffness + x;
-        let rise = wanted - (d * state.u - state.memory.value);
+        let rise = wanted - (d * last - value);
         // The change of u without hysteresis: a lower bound of its size, for alpha >= 0.
         let plain = rise / d;
-        let direction = if plain < 0.0 { -1.0 } else { 1.0 };
-        let branch = self.operator.branch(&state.memory, direction);
-        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let direction = if plain < zero { -one } else { one };
+        let branch = self.operator.branch(&state.memory, N::scalar(direction));
+        let (mut low, mut high) = (zero, N::Lane::INFINITY);
         let mut way = plain.abs();
         for _ in 0..MOST_TRIES {
-            let there = self.operator.along(&branch, direction * way);
-            let short = rise - (d * direction * way - (there.value - state.memory.value));
+            let there = self.operator.along(&branch, N::scalar(direction * way));
+            let short = rise - (d * direction * way - (there.value.value() - value));
             if !short.is_finite() {
-                return f64::NAN;
+                return N::Lane::NAN;
             }
-            let done = short.abs() <= 1e-15 * (wanted.abs() + (d * state.u).abs());
-            if short / d * direction > 0.0 {
+            let done = short.abs() <= near * (wanted.abs() + (d * last).abs());
+            if short / d * direction > zero {
                 low = way;
             } else {
                 high = way;
             }
-            let newton = way + short / (d - there.slope) * direction;
+            let newton = way + short / (d - there.slope.value()) * direction;
             let inside = newton > low && newton < high;
-            let next = if inside { newton } else { 0.5 * (low + high.min(2.0 * way + 1.0)) };
-            if done || (next - way).abs() <= 1e-15 * (way + state.u.abs()) {
-                let u = state.u + direction * way;
+            let beyond = high.smaller(N::Lane::of(2.0) * way + one);
+            let next = if inside { newton } else { N::Lane::of(0.5) * (low + beyond) };
+            if done || (next - way).abs() <= near * (way + last.abs()) {
+                let u = last + direction * way;
                 if !u.is_finite() {
-                    return f64::NAN;
+                    return N::Lane::NAN;
                 }
-                *state = BoucWenInverseState { u, memory: there };
+                *state = BoucWenInverseState { u: N::scalar(u), memory: there };
                 return u;
             }
             way = next;
         }
-        f64::NAN
+        N::Lane::NAN
     }
 }
 
@@ -186,22 +275,22 @@ const MOST_TRIES: usize = 100;
 
 /// State of a [`BoucWenInverse`]: the last drive (V) and the state of the operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoucWenInverseState {
-    u: f64,
-    memory: BoucWenState<f64>,
+pub struct BoucWenInverseState<N = f64> {
+    u: N,
+    memory: BoucWenState<N>,
 }
 
-crate::snapshot!(BoucWenInverseState { u, memory });
+crate::snapshot!([N: crate::Snapshot] BoucWenInverseState<N> { u, memory });
 
-impl<O: Operator<f64, State = BoucWenState<f64>>> Inverse for BoucWenInverse<O> {
-    type State = BoucWenInverseState;
+impl<N: Scalar, O: Operator<N, State = BoucWenState<N>>> Inverse<N::Lane> for BoucWenInverse<O, N> {
+    type State = BoucWenInverseState<N>;
 
     fn rest(&self) -> Self::State {
         self.rest()
     }
 
     #[inline]
-    fn step(&self, state: &mut Self::State, x: f64, v: f64, a: f64) -> f64 {
+    fn step(&self, state: &mut Self::State, x: N::Lane, v: N::Lane, a: N::Lane) -> N::Lane {
         self.step(state, x, v, a)
     }
 }

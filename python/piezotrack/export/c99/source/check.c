@@ -1,7 +1,6 @@
 /*
  * Runs vectors.csv through NAME_step and prints the largest difference to what the controller of
  * piezotrack gives. Returns 0 where all are within the bound and at most @flags flags differ.
-@closed
  *
  *     cc -std=c99 -O2 -ffp-contract=off -o check check.c NAME.c@link && ./check vectors.csv
  */
@@ -17,6 +16,9 @@
 
 static NAME_state state;
 #if CLOSED
+
+/* The loop is closed around the stage of the vectors, a lag: an observer around an integral would
+   add up twice what floats leave out, where no reading answers. */
 
 /* How far the stage is from where it is in the vectors, m. */
 static double away;

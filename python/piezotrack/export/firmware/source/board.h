@@ -27,7 +27,8 @@ uint32_t board_millis(void);
 /* The next byte of the link, or -1 where there is none. */
 int board_get(void);
 
-/* Sends a byte over the link; waits until there is room for it. */
+/* Sends a byte over the link. It waits for room, for far less than the watchdog's time: then the rest
+   of the line is dropped, or the client hung up on. */
 void board_put(char byte);
 
 /* False where the link is known to be lost. A serial line does not know, and returns true. */

@@ -16,6 +16,7 @@
 
 void systick_handler(void);
 void converters_handler(void);
+void timer_handler(void);
 
 static inner_state loop;
 
@@ -24,6 +25,10 @@ void systick_handler(void)
 }
 
 void converters_handler(void)
+{
+}
+
+void timer_handler(void)
 {
 }
 

@@ -16,6 +16,7 @@ int main(void);
 void reset_handler(void);
 void systick_handler(void);
 void converters_handler(void);
+void timer_handler(void);
 void *memcpy(void *to, const void *from, size_t bytes);
 void *memset(void *to, int byte, size_t bytes);
 
@@ -69,11 +70,12 @@ union vector {
     const uint32_t *address;
 };
 
-extern const union vector vectors[19];
+extern const union vector vectors[25];
 
-__attribute__((section(".vectors"), used)) const union vector vectors[19] = {
+__attribute__((section(".vectors"), used)) const union vector vectors[25] = {
     [0] = {.address = stack_top}, [1] = {.handler = reset_handler},
     [2] = {.handler = stuck}, [3] = {.handler = stuck}, [4] = {.handler = stuck},
     [5] = {.handler = stuck}, [6] = {.handler = stuck}, [15] = {.handler = systick_handler},
     [18] = {.handler = converters_handler}, /* receiver of UART 1 */
+    [24] = {.handler = timer_handler}, /* timer 0 */
 };

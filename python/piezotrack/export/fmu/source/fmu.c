@@ -1,16 +1,3 @@
-"""The functions of FMI 2.0 around a controller in C."""
-
-from __future__ import annotations
-
-__all__ = ["FMU_CODE", "FORWARD_INPUT"]
-
-# The third input, by where the feedforward comes from.
-FORWARD_INPUT = {
-    "given": ("feedforward", "Feedforward of your own, 0 for none"),
-    "online": ("next", "Desired displacement one step later"),
-}
-
-FMU_CODE = """\
 /*
  * FMI 2.0 for co-simulation around NAME_step. A communication step is one sampling interval, or a
  * whole number of them, in which the inputs are held; the outputs are those of its last sample.
@@ -19,7 +6,9 @@ FMU_CODE = """\
 #include <stddef.h>
 #include <string.h>
 
-#include "@file.h"
+#include "NAME.h"
+
+#include "unit.h"
 
 #if defined(_WIN32)
 #define EXPORTED __declspec(dllexport)
@@ -27,18 +16,16 @@ FMU_CODE = """\
 #define EXPORTED __attribute__((visibility("default")))
 #endif
 
-#define DT @dt /* sampling interval, s */
-#define GUID "@guid"
-#define INPUTS 4u
-#define REALS 10u
-#define VARIABLES 13u
-#define NO_REPORT 1e299 /* an applied voltage from here on is no report */
 
-typedef void *fmi2Component, *fmi2ComponentEnvironment, *fmi2FMUstate;
+typedef void *fmi2Component;
+typedef void *fmi2ComponentEnvironment;
+typedef void *fmi2FMUstate;
 typedef unsigned int fmi2ValueReference;
 typedef double fmi2Real;
-typedef int fmi2Integer, fmi2Boolean;
-typedef char fmi2Char, fmi2Byte;
+typedef int fmi2Integer;
+typedef int fmi2Boolean;
+typedef char fmi2Char;
+typedef char fmi2Byte;
 typedef const fmi2Char *fmi2String;
 typedef enum { fmi2OK, fmi2Warning, fmi2Discard, fmi2Error, fmi2Fatal, fmi2Pending } fmi2Status;
 typedef enum { fmi2ModelExchange, fmi2CoSimulation } fmi2Type;
@@ -53,17 +40,18 @@ typedef struct {
 
 typedef struct {
     NAME_state state;
-    double in[INPUTS];
+    double in[UNIT_INPUTS]; /* by value reference */
     fmi2CallbackFunctions functions;
     char name[128];
 } unit_t;
 
 static void begin(unit_t *unit)
 {
-    unit->in[0] = 0;
-    unit->in[1] = 0;
-    unit->in[2] = 0;
-    unit->in[3] = 1e300;
+    size_t i;
+    for (i = 0; i < UNIT_INPUTS; i++) {
+        unit->in[i] = 0.0;
+    }
+    unit->in[UNIT_APPLIED] = UNIT_NO_REPORT;
     NAME_init(&unit->state);
 }
 
@@ -95,7 +83,7 @@ EXPORTED fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2Strin
     (void)visible;
     (void)logging;
     if (functions == NULL || functions->allocateMemory == NULL || name == NULL || guid == NULL
-        || type != fmi2CoSimulation || strcmp(guid, GUID) != 0) {
+        || type != fmi2CoSimulation || strcmp(guid, UNIT_GUID) != 0) {
         return NULL;
     }
     unit = functions->allocateMemory(1, sizeof *unit);
@@ -103,8 +91,8 @@ EXPORTED fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2Strin
         return NULL;
     }
     unit->functions = *functions;
-    strncpy(unit->name, name, sizeof unit->name - 1);
-    unit->name[sizeof unit->name - 1] = 0;
+    (void)strncpy(unit->name, name, sizeof unit->name - 1u);
+    unit->name[sizeof unit->name - 1u] = 0;
     begin(unit);
     return unit;
 }
@@ -117,12 +105,26 @@ EXPORTED void fmi2FreeInstance(fmi2Component c)
     }
 }
 
+static void step(unit_t *unit)
+{
+    const NAME_real reference = (NAME_real)unit->in[UNIT_REFERENCE];
+    const NAME_real measured = (NAME_real)unit->in[UNIT_MEASURED];
+#if FORWARD_ONLINE
+    (void)NAME_step(&unit->state, reference, (NAME_real)unit->in[UNIT_NEXT], measured);
+#elif FORWARD_TABLE
+    (void)NAME_step(&unit->state, reference, measured);
+#else
+    (void)NAME_step(&unit->state, reference, measured, (NAME_real)unit->in[UNIT_FEEDFORWARD]);
+#endif
+}
+
 EXPORTED fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2Boolean noSet)
 {
     unit_t *unit = c;
     const double *in = unit->in;
-    const double whole = h / DT;
-    long steps, k;
+    const double whole = h / UNIT_INTERVAL;
+    long steps;
+    long k;
     (void)time;
     (void)noSet;
     if (!(whole > 0.5 && whole < 1e9)) {
@@ -133,10 +135,10 @@ EXPORTED fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real h, fmi2B
         return refuse(unit, "the step is not a whole number of sampling intervals");
     }
     for (k = 0; k < steps; k++) {
-        if (in[3] < NO_REPORT) {
-            NAME_applied(&unit->state, (NAME_real)in[3]);
+        if (in[UNIT_APPLIED] < 0.1 * UNIT_NO_REPORT) {
+            (void)NAME_applied(&unit->state, (NAME_real)in[UNIT_APPLIED]);
         }
-        @call
+        step(unit);
     }
     return fmi2OK;
 }
@@ -146,14 +148,34 @@ EXPORTED fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference *which
 {
     const unit_t *unit = c;
     const NAME_command *last = &unit->state.last;
-    const double out[] = {last->volts,    last->unclipped,  last->feedforward,
-                          last->feedback, last->repetitive, last->error};
     size_t i;
     for (i = 0; i < count; i++) {
-        if (which[i] >= REALS) {
-            return refuse(unit, "there is no such real variable");
+        switch (which[i]) {
+        case UNIT_COMMAND:
+            values[i] = (double)last->volts;
+            break;
+        case UNIT_UNCLIPPED:
+            values[i] = (double)last->unclipped;
+            break;
+        case UNIT_FEEDFORWARD_PART:
+            values[i] = (double)last->feedforward;
+            break;
+        case UNIT_FEEDBACK_PART:
+            values[i] = (double)last->feedback;
+            break;
+        case UNIT_REPETITIVE_PART:
+            values[i] = (double)last->repetitive;
+            break;
+        case UNIT_ERROR:
+            values[i] = (double)last->error;
+            break;
+        default:
+            if (which[i] >= UNIT_INPUTS) {
+                return refuse(unit, "there is no such real variable");
+            }
+            values[i] = unit->in[which[i]];
+            break;
         }
-        values[i] = which[i] < INPUTS ? unit->in[which[i]] : out[which[i] - INPUTS];
     }
     return fmi2OK;
 }
@@ -164,7 +186,7 @@ EXPORTED fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference *which
     unit_t *unit = c;
     size_t i;
     for (i = 0; i < count; i++) {
-        if (which[i] >= INPUTS) {
+        if (which[i] >= UNIT_INPUTS) {
             return refuse(unit, "only inputs can be set");
         }
         unit->in[which[i]] = values[i];
@@ -177,13 +199,21 @@ EXPORTED fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference *wh
 {
     const unit_t *unit = c;
     const NAME_command *last = &unit->state.last;
-    const int out[] = {last->saturated, last->measurement_ok, last->reference_ok};
     size_t i;
     for (i = 0; i < count; i++) {
-        if (which[i] < REALS || which[i] >= VARIABLES) {
+        switch (which[i]) {
+        case UNIT_SATURATED:
+            values[i] = (fmi2Boolean)last->saturated;
+            break;
+        case UNIT_MEASUREMENT_OK:
+            values[i] = (fmi2Boolean)last->measurement_ok;
+            break;
+        case UNIT_REFERENCE_OK:
+            values[i] = (fmi2Boolean)last->reference_ok;
+            break;
+        default:
             return refuse(unit, "there is no such Boolean variable");
         }
-        values[i] = out[which[i] - REALS];
     }
     return fmi2OK;
 }
@@ -199,22 +229,30 @@ EXPORTED fmi2Status fmi2Reset(fmi2Component c)
 EXPORTED fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean t, fmi2Real tolerance,
                                         fmi2Real start, fmi2Boolean s, fmi2Real stop)
 {
-    (void)c, (void)t, (void)tolerance, (void)start, (void)s, (void)stop;
+    (void)c;
+    (void)t;
+    (void)tolerance;
+    (void)start;
+    (void)s;
+    (void)stop;
     return fmi2OK;
 }
 
 EXPORTED fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count,
                                         const fmi2String *categories)
 {
-    (void)c, (void)on, (void)count, (void)categories;
+    (void)c;
+    (void)on;
+    (void)count;
+    (void)categories;
     return fmi2OK;
 }
 
-#define NOTHING_TO_DO(function)                       \\
-    EXPORTED fmi2Status function(fmi2Component c)     \\
-    {                                                 \\
-        (void)c;                                      \\
-        return fmi2OK;                                \\
+#define NOTHING_TO_DO(function)                       \
+    EXPORTED fmi2Status function(fmi2Component c)     \
+    {                                                 \
+        (void)c;                                      \
+        return fmi2OK;                                \
     }
 
 NOTHING_TO_DO(fmi2EnterInitializationMode)
@@ -223,10 +261,10 @@ NOTHING_TO_DO(fmi2Terminate)
 
 /* What the description says that the unit does not have. */
 
-#define NOT_THERE(function, ...)                                 \\
-    EXPORTED fmi2Status function(fmi2Component c, __VA_ARGS__)   \\
-    {                                                            \\
-        return refuse(c, #function " is not there");             \\
+#define NOT_THERE(function, ...)                                 \
+    EXPORTED fmi2Status function(fmi2Component c, __VA_ARGS__)   \
+    {                                                            \
+        return refuse(c, #function " is not there");             \
     }
 #define WHICH const fmi2ValueReference *which, size_t count
 
@@ -259,4 +297,3 @@ EXPORTED fmi2Status fmi2CancelStep(fmi2Component c)
 {
     return refuse(c, "fmi2CancelStep is not there");
 }
-"""

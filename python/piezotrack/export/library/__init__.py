@@ -1,0 +1,1 @@
+"""A controller that calls the C library of piezotrack."""
