@@ -86,12 +86,6 @@ impl<T: Real> Span<T> {
         self.high
     }
 
-    /// How far the stage can move in a sample, m; infinite where any jump is accepted.
-    #[must_use]
-    pub fn max_jump(&self) -> T {
-        self.max_jump
-    }
-
     /// Whether the stage can have this displacement (m); false for NaN.
     #[inline]
     #[must_use]
@@ -105,8 +99,7 @@ impl<T: Real> Span<T> {
     /// What is further away only saturates, and teaches a repetitive part what it forgets for ever
     /// after.
     #[inline]
-    #[must_use]
-    pub fn may_ask_for(&self, reference: T) -> bool {
+    pub(crate) fn may_ask_for(&self, reference: T) -> bool {
         let width = self.high - self.low;
         reference >= self.low - width && reference <= self.high + width
     }

@@ -1,7 +1,7 @@
 //! Loops in lanes against loops simulated one by one.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-use piezotrack_control::{Controller, Filter, Limits, Pid, Repetitive, Smoothing, Span};
+use piezotrack_control::{Controller, Filter, Limits, Pid, Repetitive, Smoothing};
 use piezotrack_core::design::{LoopPlant, SampledLoop};
 use piezotrack_core::models::Model;
 use piezotrack_core::parts::Law;
@@ -122,66 +122,6 @@ fn the_bits_do_not_depend_on_the_threads_or_the_neighbours() {
         let single = task.figures(&all[7..8], NEVER).unwrap();
         assert_eq!(single[0], one[7]);
     }
-}
-
-/// PID controllers of every kind, with repetitive parts or none, each with a span.
-fn pids(repetitive: bool, span: Span) -> Vec<Controller<Law>> {
-    let kinds = [(0.02, 0.01, None), (f64::INFINITY, 0.0, None), (0.01, 0.0, Some(0.03))];
-    (0..10)
-        .zip(kinds.iter().cycle())
-        .map(|(i, &(ti, td, tt))| {
-            let pid = Pid::new(0.02e6 + 0.008e6 * f64::from(i), ti, td, tt).unwrap();
-            let limits = Limits::new(0.0, 40.0 + f64::from(i)).unwrap();
-            let mut one = Controller::new(limits, Law::Pid(pid.at(DT).unwrap()));
-            one.span = span;
-            if repetitive {
-                let part = Repetitive::new(2.5, Smoothing::ZeroPhase { order: 2 }, 0.2).unwrap();
-                one.repetitive = Some(part.at(DT).unwrap());
-            }
-            one
-        })
-        .collect()
-}
-
-/// A PID controller among others is stepped by the code that firmware runs, among its like in lanes.
-#[test]
-fn pids_in_lanes_have_the_bits_of_those_that_are_stepped_one_by_one() {
-    let dahl = Model::Dahl.build(&(Model::Dahl.info().published[0].1)()).unwrap();
-    let mut noisy = VirtualStage::bare(dahl, 5e-5);
-    noisy.sensor.noise = 20e-9;
-    let (reference, feedforward) = (reference(400), vec![3.0; 400]);
-    let samples = ReferenceSamples { reference: &reference, feedforward: &feedforward };
-    let wide = Span::default();
-    let narrow = Span::new(-5e-6, 60e-6).unwrap();
-    let jumping = wide.with_max_jump(3e-6).unwrap();
-    let mut clipped = Vec::new();
-    for stage in [VirtualStage::xu_li_2010(3), noisy] {
-        let whole = task(&stage, samples, 1e-3);
-        let later = Task { error: ErrorSignal::True, from: 10, ..task(&stage, samples, 0.0) };
-        for (task, repetitive, span) in [
-            (&whole, false, wide),
-            (&later, false, wide),
-            (&later, true, wide),
-            (&whole, false, narrow),
-            (&later, true, narrow),
-            (&whole, false, jumping),
-        ] {
-            let plain = pids(repetitive, span);
-            let mut mixed = Vec::new();
-            for one in &plain {
-                let mut other = *one;
-                other.filters[0] = Some(Filter::low_pass(10.0, DT).unwrap());
-                mixed.extend([*one, other]);
-            }
-            let ready = task.ready().unwrap();
-            let in_lanes = ready.figures(&plain, NEVER).unwrap();
-            let among_others = ready.figures(&mixed, NEVER).unwrap();
-            let one_by_one: Vec<_> = among_others.into_iter().step_by(2).collect();
-            assert_eq!(in_lanes, one_by_one);
-            clipped.push(in_lanes.iter().map(|one| one.clipped).fold(0.0, f64::max));
-        }
-    }
-    assert!(clipped.iter().filter(|share| **share > 0.05).count() > 9, "{clipped:?}");
 }
 
 /// Margins from the grid against the exact ones, over gains from far too low to unstable.

@@ -50,9 +50,8 @@ impl<S: Simd, const K: usize> Lanes<S, K> {
         pulp::bytemuck::cast_slice(&self.vectors)
     }
 
-    /// The lanes in order, to be written.
     #[inline(always)]
-    pub fn as_mut_slice(&mut self) -> &mut [f64] {
+    fn as_mut_slice(&mut self) -> &mut [f64] {
         pulp::bytemuck::cast_slice_mut(&mut self.vectors)
     }
 }

@@ -4,17 +4,16 @@
 //! code that firmware runs. The noise of a sensor depends on nothing that a controller does, so all
 //! lanes get the same.
 
-use piezotrack_control::{Controller, Number};
+use piezotrack_control::{Controller, ControllerState, Number};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::bundled::{Bundled, OneByOne, PidLanes};
 use super::parts::{Part, coarse_step, parts};
 use super::run_metrics::{RunMetrics, Score};
 use crate::error::{Error, Result};
 use crate::math::{Lanes, dispatch_vectors, on_all_threads, room, width, zeros};
 use crate::models::{LanedPlant, LanedVisitor, StageState};
-use crate::parts::Law;
+use crate::parts::{Law, LawState};
 use crate::signal::{Stop, index};
 use crate::simulate::{
     ApparatusState, DELAY_LINE, ReferenceSamples, Timing, VirtualStage, closed_loop,
@@ -117,7 +116,7 @@ impl<'a> Task<'a> {
             Ok(None) | Err(Error::Numerical(_)) => return Ok(Motion::failed()),
             Err(other) => return Err(other),
         };
-        let mut score = Score::new(0.0, self.timing.interval);
+        let mut score = Score::new(self.timing.interval);
         let mut shown = room("the motion", commands.len())?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
         let later = libm::round(self.shown_at * index(substeps)) as usize;
@@ -134,11 +133,11 @@ impl<'a> Task<'a> {
                 k >= self.from,
                 reference[k] - own - noise,
                 command.volts,
-                f64::from(u8::from(command.saturated)),
+                command.saturated,
             );
             shown.push(then + noise);
         }
-        Ok(Motion { figures: score.figures(|sum| *sum), shown })
+        Ok(Motion { figures: score.figures(), shown })
     }
 }
 
@@ -228,7 +227,12 @@ impl LanedVisitor for Loops<'_> {
         let chunks: Vec<&[Controller<Law>]> = controllers.chunks(width * each).collect();
         let found: Result<Vec<Vec<Motion>>> = on_all_threads(&chunks, &|chunk: &&[_]| {
             let chunk = *chunk;
-            let (plant, parts) = (&plant, &parts);
+            let states = chunk.iter().map(|one| {
+                let length = one.repetitive.map_or(0, |part| part.length());
+                Ok(one.rest(zeros(DELAY_LINE, length)?)?)
+            });
+            let states: Result<Vec<_>> = states.collect();
+            let (plant, parts, states) = (&plant, &parts, states?);
             let samples = if shown { noise.len() } else { 0 };
             let traces = (0..chunk.len()).map(|_| room("the motions", samples));
             let traces: Result<Vec<_>> = traces.collect();
@@ -239,19 +243,20 @@ impl LanedVisitor for Loops<'_> {
                 noise,
                 parts,
                 controllers: chunk,
+                states,
                 traces: traces?,
                 stop,
             };
             // Each is compiled for as many vectors as it gains by, and for no other number.
             if width == 1 {
-                return Simd::vectorize(pulp::Scalar, Bundle::<P, 1>(loops));
+                return Ok(Simd::vectorize(pulp::Scalar, Bundle::<P, 1>(loops)));
             }
             let found = if const { P::VECTORS > 1 } {
                 dispatch_vectors(arch, Bundle::<P, VECTORS>(loops))
             } else {
                 dispatch_vectors(arch, Bundle::<P, 1>(loops))
             };
-            found.unwrap_or_else(|| Ok(Vec::new()))
+            Ok(found.unwrap_or_default())
         })
         .into_iter()
         .collect();
@@ -278,6 +283,7 @@ struct Chunk<'a, P> {
     noise: &'a [f64],
     parts: &'a (usize, Vec<Part>),
     controllers: &'a [Controller<Law>],
+    states: Vec<ControllerState<LawState, Vec<f64>>>,
     /// Room for what is judged at each sample, where that is asked for.
     traces: Vec<Vec<f64>>,
     stop: Stop<'a>,
@@ -290,70 +296,51 @@ struct Bundle<'a, P, const V: usize>(Chunk<'a, P>);
 const POLL: usize = 1 << 12;
 
 impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
-    type Output = Result<Vec<Motion>>;
+    type Output = Vec<Motion>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(mut self, simd: S) -> Self::Output {
-        let zero = Lanes::<S, V>::splat(simd, 0.0);
-        let ReferenceSamples { reference, feedforward } = self.0.task.samples;
-        if let Some(mut pids) = PidLanes::new(zero, self.0.controllers, reference, feedforward)? {
-            let found = self.run(zero, &mut pids);
-            if pids.holds() {
-                return Ok(self.motions(found));
-            }
-            self.0.traces.iter_mut().for_each(Vec::clear);
-        }
-        let mut each = OneByOne::new(self.0.controllers)?;
-        let found = self.run(zero, &mut each);
-        Ok(self.motions(found))
-    }
-}
-
-impl<P: LanedPlant, const V: usize> Bundle<'_, P, V> {
-    /// The sums of the loops, unless they were stopped.
-    #[inline(always)]
-    fn run<S: Simd, C: Bundled<Lanes<S, V>>>(
-        &mut self,
-        zero: Lanes<S, V>,
-        controllers: &mut C,
-    ) -> Option<Score<Lanes<S, V>>> {
-        let Chunk { task, start, plant, noise, parts, ref mut traces, stop, .. } = self.0;
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<Motion> {
+        let Chunk { task, start, plant, noise, parts, controllers, mut states, mut traces, stop } =
+            self.0;
         let stage = task.stage;
         let (whole, parts) = parts;
+        let zero = Lanes::<S, V>::splat(simd, 0.0);
         let flows: Vec<_> = parts
             .iter()
             .map(|part| (plant.flow(zero, part.step), stage.amplifier.flow(part.step), part))
             .collect();
-        let reading = |value: Lanes<S, V>| {
-            let read = |[value]: [f64; 1]| stage.sensor.quantised(value) - start.sensor.zero;
-            Number::lanewise([value], read)
-        };
-        let judged = |reading: Lanes<S, V>, x: Lanes<S, V>| match task.error {
+        let judged = |reading: f64, x: f64| match task.error {
             ErrorSignal::Measured => reading,
-            ErrorSignal::True => x - zero.like(start.sensor.zero),
+            ErrorSignal::True => x - start.sensor.zero,
         };
         let mut state = plant.start(zero);
         let mut applied = zero.like(start.applied);
         let held = zero.like(start.command);
         // The newest last.
         let mut issued = vec![held; whole + 2];
-        let mut score = Score::new(zero, task.timing.interval);
+        let mut scores = vec![Score::new(task.timing.interval); controllers.len()];
         let samples = task.samples.reference.iter().zip(task.samples.feedforward);
         for (k, ((&reference, &feedforward), &drawn)) in samples.zip(noise).enumerate() {
             if k % POLL == POLL - 1 && stop() {
-                return None;
+                return vec![Motion::failed(); controllers.len()];
             }
-            let beside = zero.like(task.beside(k));
-            let x = plant.displacement(&state) + beside;
-            let measured = reading(x + zero.like(drawn));
-            let [volts, clipped] = controllers.step(reference, measured, feedforward);
-            let actual = judged(measured, x);
-            score.take(k >= task.from, zero.like(reference) - actual, volts, clipped);
-            if task.shown_at == 0.0 {
-                push(traces, k, &actual);
+            let shown = plant.displacement(&state);
+            let beside = task.beside(k);
+            let mut volts = [0.0; MOST_LANES];
+            for (lane, (controller, state)) in controllers.iter().zip(&mut states).enumerate() {
+                let x = shown.as_slice()[lane] + beside;
+                let reading = stage.sensor.quantised(x + drawn) - start.sensor.zero;
+                let command = controller.step(state, reference, reading, feedforward);
+                volts[lane] = command.volts;
+                let actual = judged(reading, x);
+                let (error, clipped) = (reference - actual, command.saturated);
+                if task.shown_at == 0.0 && traces[lane].capacity() > k {
+                    traces[lane].push(actual);
+                }
+                scores[lane].take(k >= task.from, error, command.volts, clipped);
             }
             issued.rotate_left(1);
-            issued[whole + 1] = volts;
+            issued[whole + 1] = Lanes::gather(simd, |lane| volts[lane]);
             for (flow, amplifier, part) in &flows {
                 let command = issued[usize::from(part.newest)];
                 let (low, high) = stage.amplifier.advance(amplifier, applied, command, command);
@@ -362,32 +349,23 @@ impl<P: LanedPlant, const V: usize> Bundle<'_, P, V> {
                 if part.shown {
                     // Noise that no command has answered yet.
                     let drawn = noise.get(k + 1).copied().unwrap_or(drawn);
-                    let x = plant.displacement(&state) + beside;
-                    push(traces, k, &judged(reading(x + zero.like(drawn)), x));
+                    let shown = plant.displacement(&state);
+                    let with_room = traces.iter_mut().zip(shown.as_slice());
+                    for (trace, x) in with_room.filter(|(trace, _)| trace.capacity() > k) {
+                        let reading =
+                            stage.sensor.quantised(x + beside + drawn) - start.sensor.zero;
+                        trace.push(judged(reading, x + beside));
+                    }
                 }
             }
         }
-        Some(score)
-    }
-
-    /// The motions of the lanes that have a controller.
-    fn motions<S: Simd>(&mut self, score: Option<Score<Lanes<S, V>>>) -> Vec<Motion> {
-        let Some(score) = score else { return vec![Motion::failed(); self.0.controllers.len()] };
-        let shown = std::mem::take(&mut self.0.traces).into_iter().enumerate();
-        let motion =
-            |(lane, shown)| Motion { figures: score.figures(|sum| sum.as_slice()[lane]), shown };
-        shown.map(motion).collect()
-    }
-}
-
-/// Adds sample `k` of each lane to the traces that have room.
-#[inline(always)]
-fn push<S: Simd, const V: usize>(traces: &mut [Vec<f64>], k: usize, values: &Lanes<S, V>) {
-    let with_room = traces.iter_mut().zip(values.as_slice());
-    for (trace, value) in with_room.filter(|(trace, _)| trace.capacity() > k) {
-        trace.push(*value);
+        let motion = |(score, shown): (&Score, _)| Motion { figures: score.figures(), shown };
+        scores.iter().zip(traces).map(motion).collect()
     }
 }
 
 /// Vectors of a bundle of several: steps of one hide how long those of the other take.
 const VECTORS: usize = 2;
+
+/// Lanes of the widest bundle.
+const MOST_LANES: usize = 8 * VECTORS;

@@ -2,7 +2,6 @@
 //! keep for every model of a set, and the search.
 
 mod adaptation;
-mod bundled;
 mod contour;
 mod evolution;
 mod judge;

@@ -1,7 +1,5 @@
 //! Metrics that are read of a closed loop while it runs.
 
-use piezotrack_control::Number;
-
 /// Metrics of the run of a closed loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunMetrics {
@@ -31,64 +29,58 @@ impl RunMetrics {
 /// Beyond this a loop counts as diverged, m.
 const DIVERGED: f64 = 1.0;
 
-/// The running sums of a loop, or of one in each lane.
+/// The running sums of a loop.
 #[derive(Clone, Copy)]
-pub(super) struct Score<N> {
+pub(super) struct Score {
     interval: f64,
     count: f64,
-    squares: N,
-    largest: N,
-    changes: N,
-    fastest: N,
-    clipped: N,
-    before: Option<N>,
+    squares: f64,
+    largest: f64,
+    changes: f64,
+    fastest: f64,
+    clipped: f64,
+    before: Option<f64>,
 }
 
-impl<N: Number> Score<N> {
-    /// The sums before the first sample; `zero` makes numbers of that type.
-    #[inline(always)]
-    pub(super) fn new(zero: N, interval: f64) -> Self {
+impl Score {
+    pub(super) fn new(interval: f64) -> Self {
         Self {
             interval,
             count: 0.0,
-            squares: zero,
-            largest: zero,
-            changes: zero,
-            fastest: zero,
-            clipped: zero,
+            squares: 0.0,
+            largest: 0.0,
+            changes: 0.0,
+            fastest: 0.0,
+            clipped: 0.0,
             before: None,
         }
     }
 
-    /// Takes a sample; `clipped` is 1 where the command was, else 0.
     #[inline(always)]
-    pub(super) fn take(&mut self, counts: bool, error: N, volts: N, clipped: N) {
-        let change = self.before.map_or(volts.like(0.0), |before| volts - before);
+    pub(super) fn take(&mut self, counts: bool, error: f64, volts: f64, clipped: bool) {
+        let change = self.before.map_or(0.0, |before| volts - before);
         self.before = Some(volts);
         if counts {
             self.count += 1.0;
-            self.squares = self.squares + error * error;
-            self.largest = self.largest.larger(error).larger(-error);
-            self.changes = self.changes + change * change;
-            self.fastest = self.fastest.larger(change).larger(-change);
-            self.clipped = self.clipped + clipped;
+            self.squares += error * error;
+            // Not so where the error is not a number
+            self.largest = if error.abs() <= self.largest { self.largest } else { error.abs() };
+            self.changes += change * change;
+            self.fastest = self.fastest.max(change.abs());
+            self.clipped += f64::from(u8::from(clipped));
         }
     }
 
-    /// The metrics of a lane, which `of` reads.
-    pub(super) fn figures(&self, of: impl Fn(&N) -> f64) -> RunMetrics {
-        let [squares, largest, changes, fastest, clipped] =
-            [&self.squares, &self.largest, &self.changes, &self.fastest, &self.clipped].map(of);
-        // Squares are not finite where an error is not a number.
-        if !(largest <= DIVERGED && squares.is_finite() && self.count > 0.0) {
+    pub(super) fn figures(&self) -> RunMetrics {
+        if !(self.largest <= DIVERGED && self.squares.is_finite() && self.count > 0.0) {
             return RunMetrics::FAILED;
         }
         RunMetrics {
-            rms: libm::sqrt(squares / self.count),
-            largest,
-            effort: libm::sqrt(changes / self.count),
-            slew: fastest / self.interval,
-            clipped: clipped / self.count,
+            rms: libm::sqrt(self.squares / self.count),
+            largest: self.largest,
+            effort: libm::sqrt(self.changes / self.count),
+            slew: self.fastest / self.interval,
+            clipped: self.clipped / self.count,
         }
     }
 }
