@@ -9,7 +9,7 @@ use crate::feedback_law::Feedback;
 use crate::filters::Filter;
 use crate::number::{Number, Real};
 use crate::pid::{PidState, SampledPid};
-use crate::repetitive::Outcome;
+use crate::repetitive::{LanedRepetitive, Outcome, RepetitiveState};
 
 /// Commands of controllers in lanes.
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +66,7 @@ pub fn step_each<F: Feedback<N::Lane>, L: AsMut<[N::Lane]>, N: Number>(
 /// let controllers = [Controller::new(limits, Pid::xu_li_2010().at(0.02)?)];
 /// let (mut alone, mut states) = (controllers[0].rest([])?, [controllers[0].rest([])?]);
 /// // A number is a vector of one lane.
-/// let mut together = Lockstep::new(0.0, &controllers, &mut states);
+/// let mut together = Lockstep::new(0.0, &controllers, &mut states, &mut []);
 /// for measured in [0.0, 0.2e-6, f64::NAN, 0.3e-6, 0.4e-6] {
 ///     let command = together.step(1e-6, measured, 0.5);
 ///     assert_eq!(command.volts, controllers[0].step(&mut alone, 1e-6, measured, 0.5).volts);
@@ -81,6 +81,10 @@ pub struct Lockstep<'a, N: Number, L> {
     states: &'a mut [ControllerState<PidState<N::Lane>, L, N::Lane>],
     /// `None` where they step one by one only.
     gains: Option<Gains<N>>,
+    /// Repetitive parts in lanes; `None` where they step one by one.
+    repetitive: Option<LanedRepetitive<'a, N>>,
+    /// Whether that is their state.
+    repeating: bool,
     memory: Memory<N>,
     place: Place,
 }
@@ -212,15 +216,35 @@ impl<N: Number> LanedFilter<N> {
     }
 }
 
-impl<'a, N: Number, L: AsMut<[N::Lane]>> Lockstep<'a, N, L> {
-    /// Takes controllers and their states for lanes of numbers like `like`, as many or fewer.
+impl<'a, N: Number, L: AsRef<[N::Lane]> + AsMut<[N::Lane]>> Lockstep<'a, N, L> {
+    /// Entries that the delay lines of controllers need in lanes; 0 where these step one by one.
+    #[must_use]
+    pub fn room(controllers: &[PidController<N>]) -> usize {
+        let first = controllers.first().and_then(|one| one.repetitive);
+        let alike = |one: &PidController<N>| match (first, one.repetitive) {
+            (Some(first), Some(part)) => first.is_shaped_like(&part),
+            _ => false,
+        };
+        if controllers.iter().all(alike) { first.map_or(0, |part| part.length()) } else { 0 }
+    }
+
+    /// Takes controllers and their states for lanes of numbers like `like`, as many or fewer, and a
+    /// delay line for all of them; where it has less than [`Self::room`], repetitive parts step one
+    /// by one.
     pub fn new(
         like: N,
         controllers: &'a [PidController<N>],
         states: &'a mut [ControllerState<PidState<N::Lane>, L, N::Lane>],
+        line: &'a mut [N],
     ) -> Self {
         let gains = Gains::new(like, controllers);
-        Self { controllers, states, gains, memory: Memory::new(like), place: Place::Each }
+        let parts = |lane: usize| {
+            let one = controllers.get(lane).or(controllers.last())?;
+            Some((one.repetitive?, one.limits.high() - one.limits.low()))
+        };
+        let repetitive = LanedRepetitive::new(like, parts, line);
+        let (memory, place) = (Memory::new(like), Place::Each);
+        Self { controllers, states, gains, repetitive, repeating: false, memory, place }
     }
 
     /// One sample, as of [`Controller::step`]: all have the same reference (m) and feedforward (V).
@@ -245,6 +269,11 @@ impl<'a, N: Number, L: AsMut<[N::Lane]>> Lockstep<'a, N, L> {
             return;
         }
         let Some(gains) = &self.gains else { return };
+        if self.repeating
+            && let Some(all) = &mut self.repetitive
+        {
+            all.settle(self.states, part_mut);
+        }
         let memory = &self.memory;
         for (lane, state) in self.states.iter_mut().enumerate() {
             let error = memory.errors[0].lane(lane);
@@ -285,7 +314,7 @@ impl<'a, N: Number, L: AsMut<[N::Lane]>> Lockstep<'a, N, L> {
     ) -> LanedCommand<N> {
         self.settle();
         let command = step_each(self.controllers, self.states, reference, measured, feedforward);
-        self.place = Place::Each;
+        (self.place, self.repeating) = (Place::Each, false);
         if self.gains.is_some() && self.states.iter().all(goes_on) {
             self.load();
         }
@@ -310,6 +339,7 @@ impl<'a, N: Number, L: AsMut<[N::Lane]>> Lockstep<'a, N, L> {
         }
         memory.excess = like.by_lane(|lane| of(lane).excess);
         memory.unlearnt = like.by_lane(|lane| of(lane).unlearnt);
+        self.repeating = self.repetitive.as_mut().is_some_and(|all| all.load(self.states, part));
         self.place = Place::Both;
     }
 
@@ -343,11 +373,23 @@ impl<'a, N: Number, L: AsMut<[N::Lane]>> Lockstep<'a, N, L> {
         if !(asks && usual && feedback.all_within(-most, most)) {
             return None;
         }
-        let repetitive = if gains.repeats {
-            learnt(self.controllers, self.states, memory.unlearnt, memory.excess)
-        } else {
-            measured.like(0.0)
-        };
+        let mut repetitive = measured.like(0.0);
+        if gains.repeats {
+            let mut found = None;
+            if self.repeating
+                && let Some(all) = &mut self.repetitive
+            {
+                found = all.step(memory.unlearnt, memory.excess, self.states, part_mut);
+                if found.is_none() {
+                    all.settle(self.states, part_mut);
+                    self.repeating = false;
+                }
+            }
+            repetitive = match found {
+                Some(volts) => volts,
+                None => learnt(self.controllers, self.states, memory.unlearnt, memory.excess),
+            };
+        }
         let unclipped = feedback + measured.each(feedforward) + repetitive;
         let volts = unclipped.larger(gains.limits.0).smaller(gains.limits.1);
         let excess = volts - unclipped;
@@ -386,7 +428,17 @@ fn goes_on<L, T: Real>(state: &ControllerState<PidState<T>, L, T>) -> bool {
     had && !state.apart && last.measurement_ok && last.reference_ok
 }
 
-/// Voltages of the repetitive parts, each in its lane.
+fn part<L, T: Real>(state: &ControllerState<PidState<T>, L, T>) -> Option<&RepetitiveState<L, T>> {
+    state.repetitive.as_ref()
+}
+
+fn part_mut<L, T: Real>(
+    state: &mut ControllerState<PidState<T>, L, T>,
+) -> Option<&mut RepetitiveState<L, T>> {
+    state.repetitive.as_mut()
+}
+
+/// Voltages of the repetitive parts, each stepped by itself, in its lane.
 #[inline(always)]
 fn learnt<N: Number, L: AsMut<[N::Lane]>>(
     controllers: &[PidController<N>],

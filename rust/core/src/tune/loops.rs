@@ -340,9 +340,11 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
             .map(|part| (plant.flow(zero, part.step), stage.amplifier.flow(part.step), part))
             .collect();
         let eye = Eye { sensor: &stage.sensor, zero: start.sensor.zero, error: task.error };
+        let mut line;
         let (mut together, mut each) = match stepped {
             Stepped::Together(ref pids, ref mut states) => {
-                (Some(Lockstep::new(zero, pids, states)), None)
+                line = line_in_lanes(zero, pids);
+                (Some(Lockstep::new(zero, pids, states, &mut line)), None)
             }
             Stepped::Each(laws, ref mut states) => (None, Some((laws, states))),
         };
@@ -391,6 +393,22 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
         let motion = |(lane, shown)| Motion { figures: score.figures(lane), shown };
         traces.into_iter().enumerate().map(motion).collect()
     }
+}
+
+/// Longest delay line in lanes, in entries: of a longer one they are not faster.
+const LONGEST_LINE: usize = 1 << 14;
+
+/// A delay line in lanes for controllers that can have one; empty for others, and where there is no
+/// memory for it, without which they step one by one.
+fn line_in_lanes<N: Number<Lane = f64>>(zero: N, pids: &[Controller<SampledPid>]) -> Vec<N> {
+    let entries = Lockstep::<N, Vec<f64>>::room(pids);
+    if entries > LONGEST_LINE {
+        return Vec::new();
+    }
+    let mut line = room(DELAY_LINE, entries).unwrap_or_default();
+    let entries = line.capacity().min(entries);
+    line.resize(entries, zero);
+    line
 }
 
 /// The sensor as controllers and their judge see it.
