@@ -9,7 +9,7 @@ use crate::feedback_law::Feedback;
 use crate::filters::Filter;
 use crate::number::{Number, Real};
 use crate::pid::{PidState, SampledPid};
-use crate::repetitive::{LanedRepetitive, Outcome, RepetitiveState};
+use crate::repetitive::{LanedRepetitive, Learner, Outcome, RepetitiveState};
 
 /// Commands of controllers in lanes.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +57,10 @@ pub fn step_each<F: Feedback<N::Lane>, L: AsMut<[N::Lane]>, N: Number>(
     LanedCommand { volts, saturated }
 }
 
+type PidController<N> = Controller<SampledPid<<N as Number>::Lane>, <N as Number>::Lane>;
+type PidControllerState<N, L> =
+    ControllerState<PidState<<N as Number>::Lane>, L, <N as Number>::Lane>;
+
 /// Controllers with a PID law, one in a lane, and their states.
 ///
 /// ```
@@ -77,8 +81,8 @@ pub fn step_each<F: Feedback<N::Lane>, L: AsMut<[N::Lane]>, N: Number>(
 /// ```
 #[derive(Debug)]
 pub struct Lockstep<'a, N: Number, L> {
-    controllers: &'a [Controller<SampledPid<N::Lane>, N::Lane>],
-    states: &'a mut [ControllerState<PidState<N::Lane>, L, N::Lane>],
+    controllers: &'a [PidController<N>],
+    states: &'a mut [PidControllerState<N, L>],
     /// `None` where they step one by one only.
     gains: Option<Gains<N>>,
     /// Repetitive parts in lanes; `None` where they step one by one.
@@ -150,8 +154,6 @@ impl<N: Number> Memory<N> {
         }
     }
 }
-
-type PidController<N> = Controller<SampledPid<<N as Number>::Lane>, <N as Number>::Lane>;
 
 impl<N: Number> Gains<N> {
     /// `None` where there is no controller, or one that is told how far its stage can jump.
@@ -234,7 +236,7 @@ impl<'a, N: Number, L: AsRef<[N::Lane]> + AsMut<[N::Lane]>> Lockstep<'a, N, L> {
     pub fn new(
         like: N,
         controllers: &'a [PidController<N>],
-        states: &'a mut [ControllerState<PidState<N::Lane>, L, N::Lane>],
+        states: &'a mut [PidControllerState<N, L>],
         line: &'a mut [N],
     ) -> Self {
         let gains = Gains::new(like, controllers);
@@ -272,7 +274,7 @@ impl<'a, N: Number, L: AsRef<[N::Lane]> + AsMut<[N::Lane]>> Lockstep<'a, N, L> {
         if self.repeating
             && let Some(all) = &mut self.repetitive
         {
-            all.settle(self.states, part_mut);
+            all.settle(self.states);
         }
         let memory = &self.memory;
         for (lane, state) in self.states.iter_mut().enumerate() {
@@ -339,7 +341,7 @@ impl<'a, N: Number, L: AsRef<[N::Lane]> + AsMut<[N::Lane]>> Lockstep<'a, N, L> {
         }
         memory.excess = like.by_lane(|lane| of(lane).excess);
         memory.unlearnt = like.by_lane(|lane| of(lane).unlearnt);
-        self.repeating = self.repetitive.as_mut().is_some_and(|all| all.load(self.states, part));
+        self.repeating = self.repetitive.as_mut().is_some_and(|all| all.load(self.states));
         self.place = Place::Both;
     }
 
@@ -379,9 +381,9 @@ impl<'a, N: Number, L: AsRef<[N::Lane]> + AsMut<[N::Lane]>> Lockstep<'a, N, L> {
             if self.repeating
                 && let Some(all) = &mut self.repetitive
             {
-                found = all.step(memory.unlearnt, memory.excess, self.states, part_mut);
+                found = all.step(memory.unlearnt, memory.excess, self.states);
                 if found.is_none() {
-                    all.settle(self.states, part_mut);
+                    all.settle(self.states);
                     self.repeating = false;
                 }
             }
@@ -421,28 +423,31 @@ fn within<T: Real>(number: T, (low, high): (T, T)) -> bool {
     low <= number && number <= high
 }
 
-/// Whether the next sample may be one in lanes.
+/// Whether the next sample may be one in lanes. It could be after one that was not as usual too, but
+/// is then rarely.
 fn goes_on<L, T: Real>(state: &ControllerState<PidState<T>, L, T>) -> bool {
     let last = state.last;
     let had = state.feedback.errors.is_some_and(|errors| errors[0] == last.error);
-    had && !state.apart && last.measurement_ok && last.reference_ok
+    // A state that was restored may hold any number.
+    let usable = state.unlearnt.is_usable() && state.excess.is_usable();
+    had && usable && !state.apart && last.measurement_ok && last.reference_ok
 }
 
-fn part<L, T: Real>(state: &ControllerState<PidState<T>, L, T>) -> Option<&RepetitiveState<L, T>> {
-    state.repetitive.as_ref()
-}
+impl<L, T: Real> Learner<L, T> for ControllerState<PidState<T>, L, T> {
+    fn part(&self) -> Option<&RepetitiveState<L, T>> {
+        self.repetitive.as_ref()
+    }
 
-fn part_mut<L, T: Real>(
-    state: &mut ControllerState<PidState<T>, L, T>,
-) -> Option<&mut RepetitiveState<L, T>> {
-    state.repetitive.as_mut()
+    fn part_mut(&mut self) -> Option<&mut RepetitiveState<L, T>> {
+        self.repetitive.as_mut()
+    }
 }
 
 /// Voltages of the repetitive parts, each stepped by itself, in its lane.
 #[inline(always)]
 fn learnt<N: Number, L: AsMut<[N::Lane]>>(
     controllers: &[PidController<N>],
-    states: &mut [ControllerState<PidState<N::Lane>, L, N::Lane>],
+    states: &mut [PidControllerState<N, L>],
     error: N,
     excess: N,
 ) -> N {

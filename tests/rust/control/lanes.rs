@@ -27,7 +27,7 @@ fn stages() -> Vec<(VirtualStage, f64)> {
 fn gains(i: u32, dt: f64, unwinds: bool) -> Controller<Law> {
     let kp = 0.02e6 * 1.3_f64.powf(f64::from(i));
     let tt = if unwinds { None } else { Some(f64::INFINITY) };
-    let pid = Pid::new(kp, 1.5 * dt, if i % 2 == 0 { 0.5 * dt } else { 0.0 }, tt).unwrap();
+    let pid = Pid::new(kp, 1.5 * dt, if i.is_multiple_of(2) { 0.5 * dt } else { 0.0 }, tt).unwrap();
     Controller::new(Limits::new(0.0, 75.0).unwrap(), Law::Pid(pid.at(dt).unwrap()))
 }
 
@@ -59,7 +59,8 @@ fn lists(dt: f64) -> Vec<(&'static str, Vec<Controller<Law>>)> {
         (
             "some filters",
             all(&|i, one| {
-                one.filters = [(i % 3 == 0).then_some(notch), (i % 2 == 0).then_some(low_pass)];
+                one.filters =
+                    [i.is_multiple_of(3).then_some(notch), i.is_multiple_of(2).then_some(low_pass)];
             }),
         ),
         ("readings refused", all(&|_, one| one.span = Span::new(-5e-6, 60e-6).unwrap())),

@@ -111,21 +111,28 @@ struct Sample {
 
 fn samples() -> impl Strategy<Value = Vec<Sample>> {
     let number = |usual: f64| prop_oneof![60 => around(usual), 1 => any_number()];
-    let sample = (number(60e-6), number(1e-6), 0..=LANES, number(10.0), 0..20_u32).prop_map(
-        |(reference, beside, lane, feedforward, settles)| Sample {
-            reference,
-            beside,
-            lane,
-            feedforward,
-            settles,
-        },
-    );
-    prop::collection::vec(sample, 1..400)
+    let sample = move |amplitude: f64| {
+        (number(amplitude), number(1e-6), 0..=LANES, number(10.0), 0..20_u32).prop_map(
+            |(reference, beside, lane, feedforward, settles)| Sample {
+                reference,
+                beside,
+                lane,
+                feedforward,
+                settles,
+            },
+        )
+    };
+    let amplitude = prop_oneof![4 => Just(60e-6), 1 => Just(0.03)];
+    amplitude.prop_flat_map(move |amplitude| prop::collection::vec(sample(amplitude), 1..400))
 }
 
 prop_compose! {
     fn controller()(
-        (kp, ti, td) in (decades(1e5, 3.0), decades(0.03, 2.0), decades(0.003, 2.0)),
+        // Some of them soon overflow, in one of the types or the other.
+        kp in prop_oneof![
+            20 => decades(1e5, 3.0), 1 => decades(1e307, 1.0), 1 => decades(1e36, 1.0),
+        ],
+        (ti, td) in (decades(0.03, 2.0), decades(0.003, 2.0)),
         tt in prop_oneof![3 => Just(None), 1 => Just(Some(f64::INFINITY))],
         (integral, derivative) in (0..10_u32, any::<bool>()),
         (low, range) in (-60.0..20.0_f64, decades(60.0, 0.5)),
@@ -134,8 +141,9 @@ prop_compose! {
     ) -> Controller<SampledPid> {
         let ti = if integral == 0 { f64::INFINITY } else { ti };
         let pid = Pid::new(kp, ti, if derivative { td } else { 0.0 }, tt).unwrap();
-        // Where back-calculation would be unstable, without it.
-        let pid = pid.at(DT).or_else(|_| Pid::new(kp, ti, td, Some(f64::INFINITY)).unwrap().at(DT));
+        // Without back-calculation where that would be unstable, or the gain cannot be sampled.
+        let plain = Pid::new(0.1e6, ti, td, Some(f64::INFINITY)).unwrap();
+        let pid = pid.at(DT).or_else(|_| plain.at(DT));
         let mut one = Controller::new(Limits::new(low, low + range).unwrap(), pid.unwrap());
         one.filters = [
             filters.0.map(|cutoff| Filter::low_pass(cutoff, DT).unwrap()),
@@ -154,13 +162,14 @@ prop_compose! {
 /// Up to four controllers: with repetitive parts of one shape, of several, or some without.
 fn controllers() -> impl Strategy<Value = Vec<Controller<SampledPid>>> {
     let gains = prop::collection::vec((controller(), 0.01..1.9_f64, learner()), 1..=LANES);
-    (gains, prop::option::of(learner()), 0..4_u32).prop_map(|(gains, shared, kind)| {
+    (gains, prop::option::of(learner()), 0..6_u32).prop_map(|(gains, shared, kind)| {
         let sampled = |part: Repetitive| part.at(DT).ok();
         let with = |(i, (mut one, kq, own)): (usize, (Controller<SampledPid>, f64, Repetitive))| {
             let same = shared.and_then(|shared| sampled(Repetitive { kq, ..shared }));
             one.repetitive = match kind {
-                0 if i % 2 == 0 => sampled(own),
-                0 => None,
+                0 => sampled(own),
+                1 if i.is_multiple_of(2) => sampled(own),
+                1 => None,
                 _ => same,
             };
             one
@@ -188,8 +197,9 @@ fn agree<T: Real>(
     let zero = Four([T::ZERO; LANES]);
     let rest = || controllers.iter().map(|one| one.rest(vec![T::ZERO; ROOM]).unwrap()).collect();
     let (mut alone, mut states): (States<T>, States<T>) = (rest(), rest());
-    let room = Lockstep::<Four<T>, Vec<T>>::room(controllers);
-    let mut line = vec![zero; if lined { room } else { 0 }];
+    // Room for parts of any shape, also where they have none in lanes.
+    let mut line = vec![zero; if lined { ROOM } else { 0 }];
+    prop_assert!(Lockstep::<Four<T>, Vec<T>>::room(controllers) <= ROOM);
     let mut together = Some(Lockstep::new(zero, controllers, &mut states, &mut line));
     let mut x = zero;
     for sample in samples {
@@ -235,4 +245,30 @@ proptest! {
             controllers.iter().filter_map(|one| one.cast().ok()).collect();
         agree(&single, &samples, lined)?;
     }
+}
+
+#[test]
+fn a_law_that_overflows_in_lanes_has_the_bits_of_one_by_itself() {
+    let limits = Limits::new(0.0, 75.0).unwrap();
+    let at = |kp: f64| {
+        let pid = Pid::new(kp, DT, 0.0, Some(f64::INFINITY)).unwrap();
+        Controller::new(limits, pid.at(DT).unwrap())
+    };
+    let sample = |k: u32| Sample {
+        // At rest first: what is huge does not begin in lanes.
+        reference: match k {
+            0..5 => 0.0,
+            _ if k % 300 < 200 => 0.02,
+            _ => -0.02,
+        },
+        beside: 0.0,
+        lane: 0,
+        feedforward: 0.0,
+        settles: if k % 150 == 0 { 0 } else { 2 },
+    };
+    let samples: Vec<Sample> = (0..900).map(sample).collect();
+    agree(&[at(1e4), at(1e308), at(1e5)], &samples, false).unwrap();
+    let single: [Controller<SampledPid<f32>, f32>; 3] =
+        [1e4, 1e38, 1e5].map(|kp| at(kp).cast().unwrap());
+    agree(&single, &samples, false).unwrap();
 }

@@ -5,6 +5,12 @@ use super::sampled::{RepetitiveState, SampledRepetitive};
 use super::saturation::{Learning, Lengths, Saturation};
 use crate::number::{Number, Real};
 
+/// A state that may have that of a repetitive part.
+pub(crate) trait Learner<L, T> {
+    fn part(&self) -> Option<&RepetitiveState<L, T>>;
+    fn part_mut(&mut self) -> Option<&mut RepetitiveState<L, T>>;
+}
+
 /// Repetitive parts in lanes, as long as all of them learn; their counts of clipped samples stay with
 /// the states of each.
 #[derive(Debug)]
@@ -61,12 +67,11 @@ impl<'a, N: Number> LanedRepetitive<'a, N> {
 
     /// Reads the states, those of the last for the lanes that are left; false where they cannot go
     /// on in lanes.
-    pub(crate) fn load<C, L: AsRef<[N::Lane]>>(
+    pub(crate) fn load<L: AsRef<[N::Lane]>, S: Learner<L, N::Lane>>(
         &mut self,
-        states: &[C],
-        of: fn(&C) -> Option<&RepetitiveState<L, N::Lane>>,
+        states: &[S],
     ) -> bool {
-        let at = |lane: usize| states.get(lane).or(states.last()).and_then(of);
+        let at = |lane: usize| states.get(lane).or(states.last()).and_then(S::part);
         let Some(first) = at(0) else { return false };
         (self.next, self.passed) = (first.next, 0);
         let mut learn = true;
@@ -81,7 +86,7 @@ impl<'a, N: Number> LanedRepetitive<'a, N> {
             return false;
         }
         // As at the start, where reading them lane by lane would take as long as many samples.
-        if states.iter().filter_map(of).all(|state| is_blank(state.line.as_ref())) {
+        if states.iter().filter_map(S::part).all(|state| is_blank(state.line.as_ref())) {
             self.line.fill(most.like(0.0));
         } else {
             for (i, entry) in self.line.iter_mut().enumerate() {
@@ -96,13 +101,9 @@ impl<'a, N: Number> LanedRepetitive<'a, N> {
     }
 
     /// Writes the states.
-    pub(crate) fn settle<C, L: AsMut<[N::Lane]>>(
-        &mut self,
-        states: &mut [C],
-        of: fn(&mut C) -> Option<&mut RepetitiveState<L, N::Lane>>,
-    ) {
+    pub(crate) fn settle<L: AsMut<[N::Lane]>, S: Learner<L, N::Lane>>(&mut self, states: &mut [S]) {
         for (lane, state) in states.iter_mut().enumerate() {
-            let Some(state) = of(state) else { continue };
+            let Some(state) = state.part_mut() else { continue };
             for (entry, slot) in self.line.iter().zip(state.line.as_mut()) {
                 *slot = entry.lane(lane);
             }
@@ -115,18 +116,17 @@ impl<'a, N: Number> LanedRepetitive<'a, N> {
     /// The voltages for this sample, from the errors of the sample before, and the voltages applied
     /// less the commands; `None`, and nothing is changed, where a lane stops learning.
     #[inline(always)]
-    pub(crate) fn step<C, L>(
+    pub(crate) fn step<L, S: Learner<L, N::Lane>>(
         &mut self,
         error: N,
         excess: N,
-        states: &mut [C],
-        of: fn(&mut C) -> Option<&mut RepetitiveState<L, N::Lane>>,
+        states: &mut [S],
     ) -> Option<N> {
         let volts = self.volts;
         let clipped = excess.smaller(-excess);
         let (mut sum, mut learns) = (volts, self.part.gain * error);
         if self.part.pause && clipped.any_negative() {
-            if !self.count(clipped, states, of) {
+            if !self.count(clipped, states) {
                 return None;
             }
             // As much of the output as takes the command to the limit.
@@ -147,12 +147,7 @@ impl<'a, N: Number> LanedRepetitive<'a, N> {
     /// Counts a sample that is clipped in the lanes below 0; false, and nothing is changed, where one
     /// stops learning.
     #[inline(never)]
-    fn count<C, L>(
-        &mut self,
-        clipped: N,
-        states: &mut [C],
-        of: fn(&mut C) -> Option<&mut RepetitiveState<L, N::Lane>>,
-    ) -> bool {
+    fn count<L, S: Learner<L, N::Lane>>(&mut self, clipped: N, states: &mut [S]) -> bool {
         let after = |lane: usize, saturation: &Saturation<N::Lane>| {
             let mut after = *saturation;
             after.pass_by(self.passed);
@@ -161,13 +156,13 @@ impl<'a, N: Number> LanedRepetitive<'a, N> {
         };
         let mut learn = true;
         for (lane, state) in states.iter_mut().enumerate() {
-            if let Some(state) = of(state) {
+            if let Some(state) = state.part_mut() {
                 learn = learn && after(lane, &state.saturation).learning == Learning::On;
             }
         }
         if learn {
             for (lane, state) in states.iter_mut().enumerate() {
-                if let Some(state) = of(state) {
+                if let Some(state) = state.part_mut() {
                     state.saturation = after(lane, &state.saturation);
                 }
             }
@@ -179,8 +174,7 @@ impl<'a, N: Number> LanedRepetitive<'a, N> {
 
 /// Whether all entries are +0.
 fn is_blank<T: Real>(entries: &[T]) -> bool {
-    // Without an end before the last one, so that several are compared at once.
-    entries
-        .iter()
-        .fold(true, |blank, entry| blank & (*entry == T::ZERO) & !entry.is_sign_negative())
+    // Counted to the end, so that several are compared at once.
+    let blank = |entry: &&T| **entry == T::ZERO && !entry.is_sign_negative();
+    entries.iter().filter(blank).count() == entries.len()
 }

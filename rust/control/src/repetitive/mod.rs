@@ -17,7 +17,7 @@ mod saturation;
 
 use saturation::Lengths;
 
-pub(crate) use laned::LanedRepetitive;
+pub(crate) use laned::{LanedRepetitive, Learner};
 pub use sampled::{Recursion, RepetitiveState, SampledRepetitive};
 pub use saturation::Outcome;
 
