@@ -351,8 +351,8 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
         let mut state = plant.start(zero);
         let mut applied = zero.like(start.applied);
         let held = zero.like(start.command);
-        // The newest last.
-        let mut issued = vec![held; whole + 2];
+        // A ring, and the place of the newest in it.
+        let (mut issued, mut newest) = (vec![held; whole + 2], 0);
         let mut score = Score::new(task.timing.interval, zero);
         let samples = task.samples.reference.iter().zip(task.samples.feedforward);
         for (k, ((&reference, &feedforward), &drawn)) in samples.zip(noise).enumerate() {
@@ -375,10 +375,12 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
             }
             let error = zero.like(reference) - actual;
             score.take(k >= task.from, error, command.volts, command.saturated);
-            issued.rotate_left(1);
-            issued[whole + 1] = command.volts;
+            newest = following(newest, whole + 2);
+            issued[newest] = command.volts;
+            let acted = following(newest, whole + 2);
+            let acts = following(acted, whole + 2);
             for (flow, amplifier, part) in &flows {
-                let command = issued[usize::from(part.newest)];
+                let command = issued[if part.newest { acts } else { acted }];
                 let (low, high) = stage.amplifier.advance(amplifier, applied, command, command);
                 plant.advance(flow, &mut state, low, high);
                 applied = high;
@@ -433,6 +435,12 @@ impl Eye<'_> {
             ErrorSignal::True => x - x.like(self.zero),
         }
     }
+}
+
+/// The place after one in a ring.
+#[inline(always)]
+fn following(place: usize, length: usize) -> usize {
+    if place + 1 < length { place + 1 } else { 0 }
 }
 
 /// Adds what is judged to the traces that have room for it: all, or none.
