@@ -58,7 +58,7 @@ const MODELS: [&str; 14] = [
 ];
 
 /// From the bottom up.
-const CONTROL: [&str; 29] = [
+const CONTROL: [&str; 30] = [
     "error",
     "snapshot",
     "number",
@@ -88,6 +88,7 @@ const CONTROL: [&str; 29] = [
     "iterative_learning",
     "measurement",
     "controller",
+    "lockstep",
 ];
 
 /// From the bottom up.

@@ -49,24 +49,24 @@ pub struct Controller<F, T = f64> {
 /// controller without one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ControllerState<S, L, T = f64> {
-    feedback: S,
-    repetitive: Option<RepetitiveState<L, T>>,
-    filters: [FilterState<T>; 2],
+    pub(crate) feedback: S,
+    pub(crate) repetitive: Option<RepetitiveState<L, T>>,
+    pub(crate) filters: [FilterState<T>; 2],
     /// Voltage to continue from at the next step, V.
     present: Option<T>,
     /// Whether there was a step since the start.
     stepped: bool,
     /// The last command.
-    last: Command<T>,
+    pub(crate) last: Command<T>,
     /// Applied voltage less the unclipped command, eu, V.
-    excess: T,
+    pub(crate) excess: T,
     /// Whether that is from a voltage that was reported.
     reported: bool,
     /// Whether the next sample is the first after a start or a reported voltage.
-    apart: bool,
+    pub(crate) apart: bool,
     /// Tracking error of the last sample, which the repetitive part has yet to store, m.
-    unlearnt: T,
-    readings: Readings<T>,
+    pub(crate) unlearnt: T,
+    pub(crate) readings: Readings<T>,
 }
 
 crate::snapshot!(

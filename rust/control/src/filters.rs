@@ -7,7 +7,7 @@ use core::f64::consts::{PI, TAU};
 
 use crate::cast::{Cast, all_rounded};
 use crate::error::{Result, check, not_negative, positive};
-use crate::number::Real;
+use crate::number::{Number, Real};
 
 /// A filter of first or second order, for one sampling interval.
 ///
@@ -111,13 +111,35 @@ impl<T: Real> Filter<T> {
     /// The filtered value of `input`, in its unit.
     #[inline]
     pub fn step(&self, state: &mut FilterState<T>, input: T) -> T {
-        let Self { b: [b0, b1, b2], a: [a1, a2] } = *self;
-        let Some([s1, s2]) = *state else {
+        let Self { b: [b0, _, b2], a: [_, a2] } = *self;
+        let Some(sums) = state else {
             *state = Some([input - b0 * input, (b2 - a2) * input]);
             return input;
         };
-        let output = b0 * input + s1;
-        *state = Some([b1 * input - a1 * output + s2, b2 * input - a2 * output]);
+        let output = self.output(sums, input);
+        self.remember(sums, input, output);
         output
+    }
+}
+
+impl<N: Number> Filter<N> {
+    /// The filtered value after the first one, of one filter or of lanes of them.
+    #[inline(always)]
+    pub(crate) fn output(&self, sums: &[N; 2], input: N) -> N {
+        self.b[0] * input + sums[0]
+    }
+
+    /// Goes on to the next sample.
+    #[inline(always)]
+    pub(crate) fn remember(&self, sums: &mut [N; 2], input: N, output: N) {
+        let Self { b: [_, b1, b2], a: [a1, a2] } = *self;
+        *sums = [b1 * input - a1 * output + sums[1], b2 * input - a2 * output];
+    }
+
+    /// The filters that a function gives for each lane of numbers like `like`.
+    pub(crate) fn in_lanes(like: N, of: impl Fn(usize) -> Filter<N::Lane>) -> Self {
+        let b = |i: usize| like.by_lane(|lane| of(lane).b[i]);
+        let a = |i: usize| like.by_lane(|lane| of(lane).a[i]);
+        Self { b: [b(0), b(1), b(2)], a: [a(0), a(1)] }
     }
 }

@@ -88,6 +88,7 @@ pub mod inverse;
 pub mod iterative_learning;
 pub mod lead_lag;
 pub mod limits;
+pub mod lockstep;
 pub mod measurement;
 mod number;
 pub mod online_feedforward;
@@ -126,6 +127,7 @@ pub use inverse::{
 pub use iterative_learning::IterativeLearning;
 pub use lead_lag::LeadLag;
 pub use limits::Limits;
+pub use lockstep::{LanedCommand, Lockstep, step_each};
 pub use measurement::{Refused, Span};
 pub use number::{Number, Real};
 pub use online_feedforward::{OnlineFeedforward, OnlineFeedforwardState, ReferenceSample};

@@ -23,7 +23,7 @@ pub const LONGEST: f64 = 1.0;
 pub struct Span<T = f64> {
     low: T,
     high: T,
-    max_jump: T,
+    pub(crate) max_jump: T,
 }
 
 impl<T: Real> Default for Span<T> {
@@ -100,8 +100,15 @@ impl<T: Real> Span<T> {
     /// after.
     #[inline]
     pub(crate) fn may_ask_for(&self, reference: T) -> bool {
+        let (low, high) = self.references();
+        reference >= low && reference <= high
+    }
+
+    /// The lowest and the highest reference that may be meant, m.
+    #[inline]
+    pub(crate) fn references(&self) -> (T, T) {
         let width = self.high - self.low;
-        reference >= self.low - width && reference <= self.high + width
+        (self.low - width, self.high + width)
     }
 }
 
@@ -122,9 +129,9 @@ crate::snapshot!(Refused { not_finite, outside, jumps });
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Readings<T = f64> {
     /// The last valid reading, m; infinite before the first.
-    last: T,
+    pub(crate) last: T,
     /// Samples since then.
-    since: u32,
+    pub(crate) since: u32,
     pub(crate) refused: Refused,
 }
 

@@ -51,6 +51,16 @@ pub trait Number:
     /// Whether `self < 0` in any lane.
     fn any_negative(self) -> bool;
 
+    /// Whether `low <= self <= high` in all lanes; false where a lane is NaN.
+    fn all_within(self, low: Self, high: Self) -> bool;
+
+    /// The number in a lane.
+    fn lane(&self, lane: usize) -> Self::Lane;
+
+    /// The numbers that a function gives for each lane, called in their order.
+    #[must_use]
+    fn by_lane(self, values: impl FnMut(usize) -> Self::Lane) -> Self;
+
     /// The larger of two numbers, lane by lane; `self` where one is NaN.
     #[must_use]
     fn larger(self, other: Self) -> Self;
@@ -182,6 +192,21 @@ impl Number for f64 {
     }
 
     #[inline(always)]
+    fn all_within(self, low: Self, high: Self) -> bool {
+        low <= self && self <= high
+    }
+
+    #[inline(always)]
+    fn lane(&self, _lane: usize) -> Self {
+        *self
+    }
+
+    #[inline(always)]
+    fn by_lane(self, mut values: impl FnMut(usize) -> Self) -> Self {
+        values(0)
+    }
+
+    #[inline(always)]
     fn larger(self, other: Self) -> Self {
         if self < other { other } else { self }
     }
@@ -298,6 +323,21 @@ impl Number for f32 {
     #[inline(always)]
     fn any_negative(self) -> bool {
         self < 0.0
+    }
+
+    #[inline(always)]
+    fn all_within(self, low: Self, high: Self) -> bool {
+        low <= self && self <= high
+    }
+
+    #[inline(always)]
+    fn lane(&self, _lane: usize) -> Self {
+        *self
+    }
+
+    #[inline(always)]
+    fn by_lane(self, mut values: impl FnMut(usize) -> Self) -> Self {
+        values(0)
     }
 
     #[inline(always)]

@@ -14,7 +14,7 @@
 use crate::cast::{Cast, rounded};
 use crate::error::{Error, Result, check, finite, not_negative};
 use crate::feedback_law::{Feedback, FeedbackSample};
-use crate::number::Real;
+use crate::number::{Number, Real};
 
 /// Gains of a PID controller, in continuous time.
 ///
@@ -145,11 +145,11 @@ pub struct SampledPid<T = f64> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PidState<T = f64> {
     /// The output, V.
-    volts: T,
+    pub(crate) volts: T,
     /// The last two errors, m. `None` before the first error, which then stands for the earlier
     /// ones too, so that the controller starts without a derivative kick. Without an integral part
     /// nothing would ever make up for what it asks for: from 0 V, that is the first output then.
-    errors: Option<[T; 2]>,
+    pub(crate) errors: Option<[T; 2]>,
 }
 
 crate::snapshot!([T: Real] PidState<T> { volts, errors });
@@ -195,6 +195,31 @@ impl<T: Real> SampledPid<T> {
     }
 }
 
+impl<N: Number> SampledPid<N> {
+    /// The output after `volts` (V), of one controller or of lanes of them: for an error, the two
+    /// before it, the last first, and the excess of the sample before.
+    #[inline(always)]
+    pub(crate) fn output(&self, volts: N, error: N, [e1, e2]: [N; 2], excess: N) -> N {
+        let rise = error - e1;
+        let bend = rise - (e1 - e2);
+        let change = self.proportional * rise
+            + self.integral * error
+            + self.derivative * bend
+            + self.tracking * excess;
+        volts + change
+    }
+
+    /// The controllers that a function gives for each lane of numbers like `like`.
+    pub(crate) fn in_lanes(like: N, of: impl Fn(usize) -> SampledPid<N::Lane>) -> Self {
+        Self {
+            proportional: like.by_lane(|lane| of(lane).proportional),
+            integral: like.by_lane(|lane| of(lane).integral),
+            derivative: like.by_lane(|lane| of(lane).derivative),
+            tracking: like.by_lane(|lane| of(lane).tracking),
+        }
+    }
+}
+
 impl<T: Real> Feedback<T> for SampledPid<T> {
     type State = PidState<T>;
 
@@ -218,13 +243,7 @@ impl<T: Real> Feedback<T> for SampledPid<T> {
         if state.errors.is_none() && self.integral == T::ZERO && state.volts == T::ZERO {
             state.volts = self.proportional * error;
         }
-        let rise = error - e1;
-        let bend = rise - (e1 - e2);
-        let change = self.proportional * rise
-            + self.integral * error
-            + self.derivative * bend
-            + self.tracking * excess;
-        let volts = state.volts + change;
+        let volts = self.output(state.volts, error, [e1, e2], excess);
         if volts.is_finite() {
             *state = PidState { volts, errors: Some([error, e1]) };
         } else {

@@ -97,6 +97,21 @@ impl<T: Real> Number for Unfused<T> {
     }
 
     #[inline(always)]
+    fn all_within(self, low: Self, high: Self) -> bool {
+        self.0.all_within(low.0, high.0)
+    }
+
+    #[inline(always)]
+    fn lane(&self, _lane: usize) -> T {
+        self.0
+    }
+
+    #[inline(always)]
+    fn by_lane(self, mut values: impl FnMut(usize) -> T) -> Self {
+        Self(values(0))
+    }
+
+    #[inline(always)]
     fn larger(self, other: Self) -> Self {
         Self(self.0.larger(other.0))
     }

@@ -8,6 +8,7 @@ mod controller_parts;
 mod design;
 mod hysteresis_observer;
 mod iterative_learning;
+mod lanes;
 mod metrics;
 mod online_feedforward;
 mod repetitive;

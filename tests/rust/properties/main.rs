@@ -6,6 +6,7 @@
 
 mod control;
 mod laws;
+mod lockstep;
 mod operators;
 mod signals;
 mod swarm;

@@ -11,11 +11,13 @@
 //! A second line keeps uRC alone, as what was learnt before saturation: see
 //! [`SampledRepetitive::step`].
 
+mod laned;
 mod sampled;
 mod saturation;
 
 use saturation::Lengths;
 
+pub(crate) use laned::{LanedRepetitive, Learner};
 pub use sampled::{Recursion, RepetitiveState, SampledRepetitive};
 pub use saturation::Outcome;
 

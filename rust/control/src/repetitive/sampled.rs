@@ -4,7 +4,7 @@ use super::saturation::{Learning, Lengths, Outcome, Saturation};
 use super::{TAPS, count, samples};
 use crate::cast::{Cast, all_rounded, rounded};
 use crate::error::{Error, Result};
-use crate::number::Real;
+use crate::number::{Number, Real};
 use crate::snapshot::Snapshot;
 
 /// Coefficients of a repetitive controller for one sampling interval; see [`crate::Repetitive::at`].
@@ -57,10 +57,10 @@ pub struct Recursion<'a, T = f64> {
     pub pause: bool,
 }
 
-/// Sum of products in two independent sums, which the processor can compute in parallel.
-#[inline]
-fn weighted<T: Real>(entries: &[T], taps: &[T]) -> T {
-    let (mut even, mut odd) = (T::ZERO, T::ZERO);
+/// Sum of products, from `zero` on, in two independent sums, which the processor can compute in parallel.
+#[inline(always)]
+fn weighted<N: Number>(entries: &[N], taps: &[N], zero: N) -> N {
+    let (mut even, mut odd) = (zero, zero);
     let mut pairs = entries.iter().zip(taps);
     while let Some((entry, tap)) = pairs.next() {
         even = even + *entry * *tap;
@@ -76,12 +76,12 @@ fn weighted<T: Real>(entries: &[T], taps: &[T]) -> T {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RepetitiveState<L, T = f64> {
     /// First what is learnt, uRC + Kq e, then what was put out, uRC: a ring of each.
-    line: L,
+    pub(super) line: L,
     /// Index of the next entry to be written.
-    next: usize,
+    pub(super) next: usize,
     /// The last output, V.
-    volts: T,
-    saturation: Saturation<T>,
+    pub(super) volts: T,
+    pub(super) saturation: Saturation<T>,
 }
 
 /// The line is written with its length, and read into one of the same length.
@@ -174,6 +174,12 @@ impl<T: Real> SampledRepetitive<T> {
     #[must_use]
     pub fn length(&self) -> usize {
         self.entries.saturating_mul(2)
+    }
+
+    /// Whether the other one writes and reads its lines at the same places.
+    pub(crate) fn is_shaped_like(&self, other: &Self) -> bool {
+        let shape = |one: &Self| (one.entries, one.unread, one.reads, one.lead, one.pause);
+        shape(self) == shape(other) && self.lengths == other.lengths
     }
 
     /// Period in samples and entries of a line: what a controller must share to use the memory of
@@ -284,10 +290,21 @@ impl<T: Real> SampledRepetitive<T> {
         *volts
     }
 
+    /// Clears everything learnt.
+    pub fn reset<L: AsMut<[T]>>(&self, state: &mut RepetitiveState<L, T>) {
+        state.line.as_mut().fill(T::ZERO);
+        state.next = 0;
+        state.volts = T::ZERO;
+        state.saturation = Saturation::NONE;
+    }
+}
+
+/// Of one controller, or of lanes of them.
+impl<N: Number> SampledRepetitive<N> {
     /// Writes an entry of both lines, what is learnt (less the error's part) and what was put out,
     /// and adds `learns` where its error belongs.
-    #[inline]
-    fn store(&self, lines: &mut [T], next: &mut usize, entry: [T; 2], learns: T) {
+    #[inline(always)]
+    pub(super) fn store(&self, lines: &mut [N], next: &mut usize, entry: [N; 2], learns: N) {
         let entries = self.entries;
         if let Some(given) = lines.get_mut(entries + *next) {
             *given = entry[1];
@@ -303,23 +320,16 @@ impl<T: Real> SampledRepetitive<T> {
     }
 
     /// The filter Q of what is learnt, without its memory; the entry at `next` is the oldest.
-    #[inline]
-    fn filtered(&self, lines: &[T], next: usize) -> T {
-        let Some(learnt) = lines.get(..self.entries) else { return T::ZERO };
+    #[inline(always)]
+    pub(super) fn filtered(&self, lines: &[N], next: usize) -> N {
+        let zero = self.pole.like(0.0);
+        let Some(learnt) = lines.get(..self.entries) else { return zero };
         let first = next + self.unread;
         let first = if first < self.entries { first } else { first - self.entries };
         let (newer, older) = learnt.split_at(first.min(learnt.len()));
         let (taps, rest) = self.taps.split_at(self.reads.min(older.len()).min(TAPS));
-        let sum = weighted(older, taps);
-        if taps.len() < self.reads { sum + weighted(newer, rest) } else { sum }
-    }
-
-    /// Clears everything learnt.
-    pub fn reset<L: AsMut<[T]>>(&self, state: &mut RepetitiveState<L, T>) {
-        state.line.as_mut().fill(T::ZERO);
-        state.next = 0;
-        state.volts = T::ZERO;
-        state.saturation = Saturation::NONE;
+        let sum = weighted(older, taps, zero);
+        if taps.len() < self.reads { sum + weighted(newer, rest, zero) } else { sum }
     }
 }
 

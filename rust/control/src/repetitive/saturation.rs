@@ -100,7 +100,13 @@ impl<T: Real> Saturation<T> {
     /// Continues with the next sample where nothing was clipped and learning is on.
     #[inline]
     pub(super) fn pass(&mut self) {
-        self.since = self.since.saturating_add(1);
+        self.pass_by(1);
+    }
+
+    /// Continues with so many samples of the same kind.
+    #[inline]
+    pub(super) fn pass_by(&mut self, samples: u32) {
+        self.since = self.since.saturating_add(samples);
     }
 
     /// Continues with the next sample; `clipped` is of the one before.

@@ -154,6 +154,30 @@ impl<S: Simd, const K: usize> Number for Lanes<S, K> {
     }
 
     #[inline(always)]
+    fn all_within(self, low: Self, high: Self) -> bool {
+        let mut all = self.simd.less_than_or_equal_f64s(low.vectors[0], self.vectors[0]);
+        for k in 0..K {
+            let above = self.simd.less_than_or_equal_f64s(low.vectors[k], self.vectors[k]);
+            let below = self.simd.less_than_or_equal_f64s(self.vectors[k], high.vectors[k]);
+            all = self.simd.and_m64s(all, self.simd.and_m64s(above, below));
+        }
+        self.simd.first_true_m64s(self.simd.not_m64s(all)) >= S::F64_LANES
+    }
+
+    #[inline(always)]
+    fn lane(&self, lane: usize) -> f64 {
+        self.as_slice()[lane]
+    }
+
+    #[inline(always)]
+    fn by_lane(mut self, mut values: impl FnMut(usize) -> f64) -> Self {
+        for (lane, slot) in self.as_mut_slice().iter_mut().enumerate() {
+            *slot = values(lane);
+        }
+        self
+    }
+
+    #[inline(always)]
     fn larger(mut self, other: Self) -> Self {
         for k in 0..K {
             let (one, other) = (self.vectors[k], other.vectors[k]);

@@ -1,5 +1,7 @@
 //! The displacement sensor: noise of a bandwidth, a smallest step, a range, a zero, a delay.
 
+use piezotrack_control::Number;
+
 use crate::error::{Error, Result, finite, not_negative};
 use crate::math::Draws;
 
@@ -112,15 +114,17 @@ impl Sensor {
         state.noise
     }
 
-    /// The nearest value that can be read, m.
+    /// The nearest value that can be read, m, of one displacement or of lanes of them; the lowest
+    /// where that is NaN.
     #[inline(always)]
-    pub(crate) fn quantised(&self, value: f64) -> f64 {
+    pub(crate) fn quantised<N: Number<Lane = f64>>(&self, value: N) -> N {
         if self.resolution == 0.0 {
-            return value.max(-self.range).min(self.range);
+            return value.like(-self.range).larger(value).smaller(value.like(self.range));
         }
         // An even number of steps has one more below zero than above.
         let lowest = -(self.range / self.resolution).round();
-        let code = (value / self.resolution).round();
-        code.max(lowest).min(-lowest - 1.0) * self.resolution
+        let step = value.like(self.resolution);
+        let code = N::lanewise([value / step], |[code]| code.round());
+        value.like(lowest).larger(code).smaller(value.like(-lowest - 1.0)) * step
     }
 }

@@ -1,10 +1,13 @@
 //! Closed loops of many controllers on one stage, in lanes.
 //!
-//! The plant and its amplifier go in lanes, a controller in each; each controller is stepped by the
-//! code that firmware runs. The noise of a sensor depends on nothing that a controller does, so all
-//! lanes get the same.
+//! The plant and its amplifier go in lanes, a controller in each. Controllers with a PID go in lanes
+//! too, with the bits of the code that firmware runs; others are stepped by that code. The noise of a
+//! sensor depends on nothing that a controller does, so all lanes get the same.
 
-use piezotrack_control::{Controller, ControllerState, Number};
+use piezotrack_control::{
+    Controller, ControllerState, Feedback, LanedCommand, Lockstep, Number, PidState, SampledPid,
+    step_each,
+};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
@@ -16,7 +19,7 @@ use crate::models::{LanedPlant, LanedVisitor, StageState};
 use crate::parts::{Law, LawState};
 use crate::signal::{Stop, index};
 use crate::simulate::{
-    ApparatusState, DELAY_LINE, ReferenceSamples, Timing, VirtualStage, closed_loop,
+    ApparatusState, DELAY_LINE, ReferenceSamples, Sensor, Timing, VirtualStage, closed_loop,
 };
 
 /// Which error counts.
@@ -116,7 +119,7 @@ impl<'a> Task<'a> {
             Ok(None) | Err(Error::Numerical(_)) => return Ok(Motion::failed()),
             Err(other) => return Err(other),
         };
-        let mut score = Score::new(self.timing.interval);
+        let mut score = Score::new(self.timing.interval, 0.0);
         let mut shown = room("the motion", commands.len())?;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
         let later = libm::round(self.shown_at * index(substeps)) as usize;
@@ -129,15 +132,11 @@ impl<'a> Task<'a> {
                 ErrorSignal::Measured => run.measured[at] - run.displacement[at],
                 ErrorSignal::True => 0.0,
             };
-            score.take(
-                k >= self.from,
-                reference[k] - own - noise,
-                command.volts,
-                command.saturated,
-            );
+            let clipped = f64::from(u8::from(command.saturated));
+            score.take(k >= self.from, reference[k] - own - noise, command.volts, clipped);
             shown.push(then + noise);
         }
-        Ok(Motion { figures: score.figures(), shown })
+        Ok(Motion { figures: score.figures(0), shown })
     }
 }
 
@@ -227,12 +226,7 @@ impl LanedVisitor for Loops<'_> {
         let chunks: Vec<&[Controller<Law>]> = controllers.chunks(width * each).collect();
         let found: Result<Vec<Vec<Motion>>> = on_all_threads(&chunks, &|chunk: &&[_]| {
             let chunk = *chunk;
-            let states = chunk.iter().map(|one| {
-                let length = one.repetitive.map_or(0, |part| part.length());
-                Ok(one.rest(zeros(DELAY_LINE, length)?)?)
-            });
-            let states: Result<Vec<_>> = states.collect();
-            let (plant, parts, states) = (&plant, &parts, states?);
+            let (plant, parts) = (&plant, &parts);
             let samples = if shown { noise.len() } else { 0 };
             let traces = (0..chunk.len()).map(|_| room("the motions", samples));
             let traces: Result<Vec<_>> = traces.collect();
@@ -242,8 +236,7 @@ impl LanedVisitor for Loops<'_> {
                 plant,
                 noise,
                 parts,
-                controllers: chunk,
-                states,
+                stepped: Stepped::new(chunk)?,
                 traces: traces?,
                 stop,
             };
@@ -275,6 +268,44 @@ fn noises(task: &Task<'_>, start: &ApparatusState<StageState>) -> Result<Vec<f64
     Ok(noise)
 }
 
+/// Controllers of a chunk, with their states.
+enum Stepped<'a> {
+    /// With a PID all of them, in lanes.
+    Together(Vec<Controller<SampledPid>>, States<PidState>),
+    /// One by one.
+    Each(&'a [Controller<Law>], States<LawState>),
+}
+
+type States<S> = Vec<ControllerState<S, Vec<f64>>>;
+
+impl<'a> Stepped<'a> {
+    fn new(controllers: &'a [Controller<Law>]) -> Result<Self> {
+        let pids: Option<Vec<_>> = controllers.iter().map(with_pid).collect();
+        Ok(match pids {
+            Some(pids) => {
+                let states = rests(&pids)?;
+                Self::Together(pids, states)
+            }
+            None => Self::Each(controllers, rests(controllers)?),
+        })
+    }
+}
+
+/// The controller as one of a PID, where it has one.
+fn with_pid(one: &Controller<Law>) -> Option<Controller<SampledPid>> {
+    let Controller { limits, span, ref feedback, repetitive, filters } = *one;
+    let Law::Pid(feedback) = *feedback else { return None };
+    Some(Controller { limits, span, feedback, repetitive, filters })
+}
+
+fn rests<F: Feedback>(controllers: &[Controller<F>]) -> Result<States<F::State>> {
+    let rest = |one: &Controller<F>| {
+        let length = one.repetitive.map_or(0, |part| part.length());
+        Ok(one.rest(zeros(DELAY_LINE, length)?)?)
+    };
+    controllers.iter().map(rest).collect()
+}
+
 /// Loops that are simulated together.
 struct Chunk<'a, P> {
     task: &'a Task<'a>,
@@ -282,8 +313,7 @@ struct Chunk<'a, P> {
     plant: &'a P,
     noise: &'a [f64],
     parts: &'a (usize, Vec<Part>),
-    controllers: &'a [Controller<Law>],
-    states: Vec<ControllerState<LawState, Vec<f64>>>,
+    stepped: Stepped<'a>,
     /// Room for what is judged at each sample, where that is asked for.
     traces: Vec<Vec<f64>>,
     stop: Stop<'a>,
@@ -300,72 +330,127 @@ impl<P: LanedPlant, const V: usize> WithSimd for Bundle<'_, P, V> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Motion> {
-        let Chunk { task, start, plant, noise, parts, controllers, mut states, mut traces, stop } =
-            self.0;
-        let stage = task.stage;
+        let Chunk { task, start, plant, noise, parts, mut stepped, mut traces, stop } = self.0;
+        let (stage, loops) = (task.stage, traces.len());
+        let traced = traces.iter().any(|trace| trace.capacity() > 0);
         let (whole, parts) = parts;
         let zero = Lanes::<S, V>::splat(simd, 0.0);
         let flows: Vec<_> = parts
             .iter()
             .map(|part| (plant.flow(zero, part.step), stage.amplifier.flow(part.step), part))
             .collect();
-        let judged = |reading: f64, x: f64| match task.error {
-            ErrorSignal::Measured => reading,
-            ErrorSignal::True => x - start.sensor.zero,
+        let eye = Eye { sensor: &stage.sensor, zero: start.sensor.zero, error: task.error };
+        let mut line;
+        let (mut together, mut each) = match stepped {
+            Stepped::Together(ref pids, ref mut states) => {
+                line = line_in_lanes(zero, pids);
+                (Some(Lockstep::new(zero, pids, states, &mut line)), None)
+            }
+            Stepped::Each(laws, ref mut states) => (None, Some((laws, states))),
         };
         let mut state = plant.start(zero);
         let mut applied = zero.like(start.applied);
         let held = zero.like(start.command);
-        // The newest last.
-        let mut issued = vec![held; whole + 2];
-        let mut scores = vec![Score::new(task.timing.interval); controllers.len()];
+        // A ring, and the place of the newest in it.
+        let (mut issued, mut newest) = (vec![held; whole + 2], 0);
+        let mut score = Score::new(task.timing.interval, zero);
         let samples = task.samples.reference.iter().zip(task.samples.feedforward);
         for (k, ((&reference, &feedforward), &drawn)) in samples.zip(noise).enumerate() {
             if k % POLL == POLL - 1 && stop() {
-                return vec![Motion::failed(); controllers.len()];
+                return vec![Motion::failed(); loops];
             }
-            let shown = plant.displacement(&state);
-            let beside = task.beside(k);
-            let mut volts = [0.0; MOST_LANES];
-            for (lane, (controller, state)) in controllers.iter().zip(&mut states).enumerate() {
-                let x = shown.as_slice()[lane] + beside;
-                let reading = stage.sensor.quantised(x + drawn) - start.sensor.zero;
-                let command = controller.step(state, reference, reading, feedforward);
-                volts[lane] = command.volts;
-                let actual = judged(reading, x);
-                let (error, clipped) = (reference - actual, command.saturated);
-                if task.shown_at == 0.0 && traces[lane].capacity() > k {
-                    traces[lane].push(actual);
+            let beside = zero.like(task.beside(k));
+            let x = plant.displacement(&state) + beside;
+            let measured = eye.reading(x, drawn);
+            let command = match (&mut together, &mut each) {
+                (Some(all), _) => all.step(reference, measured, feedforward),
+                (None, Some((laws, states))) => {
+                    step_each(laws, states, reference, measured, feedforward)
                 }
-                scores[lane].take(k >= task.from, error, command.volts, clipped);
+                (None, None) => LanedCommand { volts: held, saturated: zero },
+            };
+            let actual = eye.judged(measured, x);
+            if traced && task.shown_at == 0.0 {
+                show(&mut traces, actual.as_slice());
             }
-            issued.rotate_left(1);
-            issued[whole + 1] = Lanes::gather(simd, |lane| volts[lane]);
+            let error = zero.like(reference) - actual;
+            score.take(k >= task.from, error, command.volts, command.saturated);
+            newest = following(newest, whole + 2);
+            issued[newest] = command.volts;
+            let acted = following(newest, whole + 2);
+            let acts = following(acted, whole + 2);
             for (flow, amplifier, part) in &flows {
-                let command = issued[usize::from(part.newest)];
+                let command = issued[if part.newest { acts } else { acted }];
                 let (low, high) = stage.amplifier.advance(amplifier, applied, command, command);
                 plant.advance(flow, &mut state, low, high);
                 applied = high;
-                if part.shown {
+                if traced && part.shown {
                     // Noise that no command has answered yet.
                     let drawn = noise.get(k + 1).copied().unwrap_or(drawn);
-                    let shown = plant.displacement(&state);
-                    let with_room = traces.iter_mut().zip(shown.as_slice());
-                    for (trace, x) in with_room.filter(|(trace, _)| trace.capacity() > k) {
-                        let reading =
-                            stage.sensor.quantised(x + beside + drawn) - start.sensor.zero;
-                        trace.push(judged(reading, x + beside));
-                    }
+                    let x = plant.displacement(&state) + beside;
+                    show(&mut traces, eye.judged(eye.reading(x, drawn), x).as_slice());
                 }
             }
         }
-        let motion = |(score, shown): (&Score, _)| Motion { figures: score.figures(), shown };
-        scores.iter().zip(traces).map(motion).collect()
+        let motion = |(lane, shown)| Motion { figures: score.figures(lane), shown };
+        traces.into_iter().enumerate().map(motion).collect()
+    }
+}
+
+/// Longest delay line in lanes, in entries: of a longer one they are not faster.
+const LONGEST_LINE: usize = 1 << 14;
+
+/// A delay line in lanes for controllers that can have one; empty for others, and where there is no
+/// memory for it, without which they step one by one.
+fn line_in_lanes<N: Number<Lane = f64>>(zero: N, pids: &[Controller<SampledPid>]) -> Vec<N> {
+    let entries = Lockstep::<N, Vec<f64>>::room(pids);
+    if entries > LONGEST_LINE {
+        return Vec::new();
+    }
+    let mut line = room(DELAY_LINE, entries).unwrap_or_default();
+    let entries = line.capacity().min(entries);
+    line.resize(entries, zero);
+    line
+}
+
+/// The sensor as controllers and their judge see it.
+struct Eye<'a> {
+    sensor: &'a Sensor,
+    /// Displacement that reads 0, m.
+    zero: f64,
+    error: ErrorSignal,
+}
+
+// Not closures, which are inlined by force only here.
+impl Eye<'_> {
+    #[inline(always)]
+    fn reading<N: Number<Lane = f64>>(&self, x: N, noise: f64) -> N {
+        self.sensor.quantised(x + x.like(noise)) - x.like(self.zero)
+    }
+
+    #[inline(always)]
+    fn judged<N: Number<Lane = f64>>(&self, reading: N, x: N) -> N {
+        match self.error {
+            ErrorSignal::Measured => reading,
+            ErrorSignal::True => x - x.like(self.zero),
+        }
+    }
+}
+
+/// The place after one in a ring.
+#[inline(always)]
+fn following(place: usize, length: usize) -> usize {
+    if place + 1 < length { place + 1 } else { 0 }
+}
+
+/// Adds what is judged to the traces that have room for it: all, or none.
+fn show(traces: &mut [Vec<f64>], judged: &[f64]) {
+    for (trace, value) in traces.iter_mut().zip(judged) {
+        if trace.len() < trace.capacity() {
+            trace.push(*value);
+        }
     }
 }
 
 /// Vectors of a bundle of several: steps of one hide how long those of the other take.
 const VECTORS: usize = 2;
-
-/// Lanes of the widest bundle.
-const MOST_LANES: usize = 8 * VECTORS;

@@ -1,5 +1,7 @@
 //! Metrics that are read of a closed loop while it runs.
 
+use piezotrack_control::Number;
+
 /// Metrics of the run of a closed loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunMetrics {
@@ -29,58 +31,61 @@ impl RunMetrics {
 /// Beyond this a loop counts as diverged, m.
 const DIVERGED: f64 = 1.0;
 
-/// The running sums of a loop.
+/// The running sums of a loop, or of loops in lanes.
 #[derive(Clone, Copy)]
-pub(super) struct Score {
+pub(super) struct Score<N> {
     interval: f64,
     count: f64,
-    squares: f64,
-    largest: f64,
-    changes: f64,
-    fastest: f64,
-    clipped: f64,
-    before: Option<f64>,
+    squares: N,
+    largest: N,
+    changes: N,
+    fastest: N,
+    clipped: N,
+    before: Option<N>,
 }
 
-impl Score {
-    pub(super) fn new(interval: f64) -> Self {
+impl<N: Number<Lane = f64>> Score<N> {
+    pub(super) fn new(interval: f64, zero: N) -> Self {
         Self {
             interval,
             count: 0.0,
-            squares: 0.0,
-            largest: 0.0,
-            changes: 0.0,
-            fastest: 0.0,
-            clipped: 0.0,
+            squares: zero,
+            largest: zero,
+            changes: zero,
+            fastest: zero,
+            clipped: zero,
             before: None,
         }
     }
 
+    /// A sample: its error, m, its command, V, and 1 where that was clipped, otherwise 0.
     #[inline(always)]
-    pub(super) fn take(&mut self, counts: bool, error: f64, volts: f64, clipped: bool) {
-        let change = self.before.map_or(0.0, |before| volts - before);
+    pub(super) fn take(&mut self, counts: bool, error: N, volts: N, clipped: N) {
+        let change = volts - self.before.unwrap_or(volts);
         self.before = Some(volts);
         if counts {
             self.count += 1.0;
-            self.squares += error * error;
-            // Not so where the error is not a number
-            self.largest = if error.abs() <= self.largest { self.largest } else { error.abs() };
-            self.changes += change * change;
-            self.fastest = self.fastest.max(change.abs());
-            self.clipped += f64::from(u8::from(clipped));
+            // Stays NaN where an error is, which the largest one may not.
+            self.squares = self.squares + error * error;
+            self.largest = self.largest.larger(error).larger(-error);
+            self.changes = self.changes + change * change;
+            self.fastest = self.fastest.larger(change).larger(-change);
+            self.clipped = self.clipped + clipped;
         }
     }
 
-    pub(super) fn figures(&self) -> RunMetrics {
-        if !(self.largest <= DIVERGED && self.squares.is_finite() && self.count > 0.0) {
+    pub(super) fn figures(&self, lane: usize) -> RunMetrics {
+        let of = |sum: &N| sum.lane(lane);
+        let (squares, largest) = (of(&self.squares), of(&self.largest));
+        if !(largest <= DIVERGED && squares.is_finite() && self.count > 0.0) {
             return RunMetrics::FAILED;
         }
         RunMetrics {
-            rms: libm::sqrt(self.squares / self.count),
-            largest: self.largest,
-            effort: libm::sqrt(self.changes / self.count),
-            slew: self.fastest / self.interval,
-            clipped: self.clipped / self.count,
+            rms: libm::sqrt(squares / self.count),
+            largest,
+            effort: libm::sqrt(of(&self.changes) / self.count),
+            slew: of(&self.fastest) / self.interval,
+            clipped: of(&self.clipped) / self.count,
         }
     }
 }
