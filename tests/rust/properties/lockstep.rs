@@ -220,8 +220,6 @@ fn agree<T: Real>(
             all.settle();
         }
         if sample.settles == 0 {
-            let all = together.take();
-            drop(all);
             prop_assert_eq!(bits(&states), bits(&alone));
             together = Some(Lockstep::new(zero, controllers, &mut states, &mut line));
         }
@@ -264,7 +262,7 @@ fn a_law_that_overflows_in_lanes_has_the_bits_of_one_by_itself() {
         beside: 0.0,
         lane: 0,
         feedforward: 0.0,
-        settles: if k % 150 == 0 { 0 } else { 2 },
+        settles: if k.is_multiple_of(150) { 0 } else { 2 },
     };
     let samples: Vec<Sample> = (0..900).map(sample).collect();
     agree(&[at(1e4), at(1e308), at(1e5)], &samples, false).unwrap();
