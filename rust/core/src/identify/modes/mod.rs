@@ -16,7 +16,8 @@ mod refine;
 mod responses;
 mod terms;
 
-pub use distortion::{Distortion, DistortionRecord, ModalForce, choose_distortion};
+pub use distortion::{Distortion, ModalForce, choose_distortion};
+pub use normal_equations::DistortionRecord;
 pub use refine::Descent;
 pub use responses::ModalFit;
 pub use terms::ModalTerms;

@@ -2,17 +2,75 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::distortion::DistortionRecord;
 use super::factors::{Factors, scale_matrix};
 use super::products::{Columns, Products};
 use super::responses::CHUNK;
 use super::terms::{ModalTerms, inverse};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::{C, dispatch_fused, room, zeros};
 use crate::signal::{Stop, index};
 
 /// Share of a column below which it depends on those of the drives.
 const DEPENDENT: f64 = 1e-6;
+
+/// Lines of the residual of the modes at one level, and of inputs that may explain it.
+///
+/// Complex numbers are real and imaginary part.
+#[derive(Clone, Copy, Debug)]
+pub struct DistortionRecord<'a> {
+    /// The modes.
+    pub terms: &'a ModalTerms,
+    /// Angle of each line per sample.
+    pub angles: &'a [f64],
+    /// Inputs, line by line and input by input, of all realisations; the drives come first.
+    pub inputs: &'a [[f64; 2]],
+    /// Residual of the modes, line by line and sensor by sensor, of all realisations.
+    pub residual: &'a [[f64; 2]],
+    /// Weights, line by line, of the sensors.
+    pub weights: &'a [f64],
+    /// The level to each of some powers, the same powers at all levels.
+    pub powers: &'a [f64],
+}
+
+impl DistortionRecord<'_> {
+    fn realisations(&self) -> usize {
+        self.residual.len() / (self.angles.len() * self.terms.sensors).max(1)
+    }
+
+    /// Number of inputs, where all lists fit each other.
+    fn checked(&self, drives: usize) -> Result<usize> {
+        let (lines, sensors) = (self.angles.len(), self.terms.sensors);
+        let realisations = self.realisations();
+        let inputs = self.inputs.len() / (lines * realisations).max(1);
+        let expected = [
+            ("residual", self.residual.len(), lines * sensors * realisations),
+            ("inputs", self.inputs.len(), lines * inputs * realisations),
+            ("weights", self.weights.len(), lines * sensors),
+        ];
+        for (name, found, expected) in expected {
+            if found != expected || found == 0 {
+                return Err(Error::Shape {
+                    name: name.into(),
+                    found: format!("{found} entries"),
+                    expected: format!("{} of {lines} lines", expected.max(1)),
+                });
+            }
+        }
+        let numbers = self.residual.iter().chain(self.inputs).flatten();
+        let numbers = numbers.chain(self.weights).chain(self.powers);
+        if let Some(value) = numbers.into_iter().find(|value| !value.is_finite()) {
+            return Err(Error::parameter(
+                "inputs, residual, weights or powers",
+                value,
+                "finite numbers",
+            ));
+        }
+        if drives > inputs {
+            return Err(Error::parameter("drives", drives, format!("{inputs} at most")));
+        }
+        Ok(inputs)
+    }
+}
 
 /// Normal equations of one level, of real and imaginary part of e of each mode and input.
 ///
