@@ -60,8 +60,6 @@
 //! assert!(command.volts > 0.0 && command.volts < 75.0);
 //! # Ok::<(), piezotrack_control::Error>(())
 //! ```
-//!
-//! In `f64` alone is [`AsymmetricPlayInverse`].
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 

@@ -5,13 +5,13 @@
 
 use core::f64::consts::TAU;
 
-use piezotrack_control::hysteresis::{LuGre, Play};
+use piezotrack_control::hysteresis::{AsymmetricPlay, LuGre, Play, PlayFamily};
 use piezotrack_control::inverse::{NetworkNumbers, NeuralNetworkInverse};
 use piezotrack_control::{
-    AsymmetricBoucWenInverse, BoucWenInverse, Cast, Creep, CreepingInverse, DahlInverse, Dynamics,
-    FirstOrderDahlInverse, Inverse, Limits, LuGreInverse, Mode, Modes, ModesInverse,
-    OnlineFeedforward, OscillatorInverse, ParallelDahlInverse, PrandtlIshlinskiiInverse, Real,
-    ReferenceSample, Snapshot,
+    AsymmetricBoucWenInverse, AsymmetricPlayInverse, BoucWenInverse, Cast, Creep, CreepingInverse,
+    DahlInverse, Dynamics, FirstOrderDahlInverse, InputInverse, Inverse, Limits, LuGreInverse,
+    Mode, Modes, ModesInverse, OnlineFeedforward, OscillatorInverse, ParallelDahlInverse,
+    PrandtlIshlinskiiInverse, Real, ReferenceSample, Snapshot,
 };
 
 const DT: f64 = 1e-3;
@@ -215,7 +215,6 @@ fn the_inverse_of_a_bouc_wen_stage_differs_by_the_roundings_of_its_samples() {
         let before = linear([1.0, damping / stiffness, mass / stiffness]);
         let solved = 8.0 * U * (LARGEST[0] + piezo * largest);
         let bound = (before + solved) / (piezo * (1.0 - 2.0 * alpha * 0.06 / 0.1));
-        println!("SEEN {found:e} {bound:e} {largest}");
         assert!(found > 0.0 && found < bound, "{found} V of {bound} V");
     }
 }
@@ -248,6 +247,23 @@ fn the_inverse_of_plays_differs_by_the_roundings_of_a_sample() {
         assert!(found > 0.0 && found < bound, "{found} V of {bound} V");
         assert!(bound < 1e-3 * largest, "{bound} V of {largest} V");
     }
+}
+
+/// Of asymmetric plays the drive is searched for: the operator's sum has roundings of displacements,
+/// its curves some of a drive, over the least slope.
+#[test]
+fn the_inverse_of_asymmetric_plays_differs_by_the_roundings_of_a_sample() {
+    let family = PlayFamily { thresholds: [2.0, 6.0], weights: [0.06e-6, 0.03e-6], count: 2 };
+    let families = [family; 3];
+    let operator = AsymmetricPlay { linear: 1e-6, range: (0.0, 75.0), families };
+    let inverse = AsymmetricPlayInverse(operator);
+    let inverse = InputInverse::<_, 0>::with(inverse, 0.0, &[], Dynamics::None, DT).unwrap();
+    let [found, largest] = apart(inverse, true);
+    // A product and a sum of each play and of the straight path; ten operations of a curve and its
+    // play, whose weights and slopes add up to less than the straight path.
+    let bound = 2.0 * 7.0 * U * LARGEST[0] / 1e-6 + 10.0 * U * 75.0 + 4.0 * U * largest;
+    assert!(found > 0.0 && found < bound, "{found} V of {bound} V");
+    assert!(bound < 1e-5 * largest, "{bound} V of {largest} V");
 }
 
 /// A stable filter of fourth order at most: what a rounding adds decays as its answer does.

@@ -21,33 +21,50 @@
 //! they go on straight: with slope 3 where they are steep, level where they are not.
 
 use super::Operator;
+use crate::cast::{Cast, all_rounded, rounded};
+use crate::error::Result;
+use crate::number::Real;
 
 /// Plays with one input.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlayFamily<const PLAYS: usize> {
+pub struct PlayFamily<const PLAYS: usize, T = f64> {
     /// Threshold of each play, half the width of its backlash, V, 0 or above.
-    pub thresholds: [f64; PLAYS],
+    pub thresholds: [T; PLAYS],
     /// Weight of each play, of the sign of the operator's `linear`, or 0.
-    pub weights: [f64; PLAYS],
+    pub weights: [T; PLAYS],
     /// How many are used.
     pub count: usize,
 }
 
-impl<const PLAYS: usize> PlayFamily<PLAYS> {
+impl<const PLAYS: usize, T: Real> PlayFamily<PLAYS, T> {
     /// Threshold, weight and place of the plays that are used.
     #[inline]
     fn with<'a>(
         &'a self,
-        plays: &'a [f64; PLAYS],
-    ) -> impl Iterator<Item = (f64, f64, f64)> + use<'a, PLAYS> {
+        plays: &'a [T; PLAYS],
+    ) -> impl Iterator<Item = (T, T, T)> + use<'a, PLAYS, T> {
         let settings = self.thresholds.iter().zip(&self.weights).zip(plays);
         settings.take(self.count).map(|((threshold, weight), play)| (*threshold, *weight, *play))
     }
+}
 
+impl<const PLAYS: usize> PlayFamily<PLAYS> {
     /// Sum of the weights' sizes.
     #[must_use]
     pub fn total(&self) -> f64 {
         self.weights.iter().take(self.count).map(|weight| weight.abs()).sum()
+    }
+}
+
+impl<const PLAYS: usize> Cast for PlayFamily<PLAYS> {
+    type In<T: Real> = PlayFamily<PLAYS, T>;
+
+    fn cast<T: Real>(&self) -> Result<PlayFamily<PLAYS, T>> {
+        Ok(PlayFamily {
+            thresholds: all_rounded("thresholds", &self.thresholds, "V")?,
+            weights: all_rounded("weights", &self.weights, "")?,
+            count: self.count,
+        })
     }
 }
 
@@ -69,9 +86,9 @@ impl Bend {
     /// Its value (V) and slope at an input, V, in a range (V).
     #[must_use]
     #[inline]
-    pub fn at(self, input: f64, range: (f64, f64)) -> (f64, f64) {
+    pub fn at<T: Real>(self, input: T, range: (T, T)) -> (T, T) {
         let (value, slope) = self.bare(input, range);
-        (value - self.bare(0.0, range).0, slope)
+        (value - self.bare(T::ZERO, range).0, slope)
     }
 
     /// The input at which it has a value, both V; infinity beyond its level end.
@@ -105,17 +122,17 @@ impl Bend {
 
     /// The function before its value at 0 is taken off.
     #[inline]
-    fn bare(self, input: f64, (low, high): (f64, f64)) -> (f64, f64) {
+    fn bare<T: Real>(self, input: T, (low, high): (T, T)) -> (T, T) {
         let length = high - low;
         match self {
-            Self::Straight => (input, 1.0),
+            Self::Straight => (input, T::of(1.0)),
             Self::Concave => {
                 let (share, slope) = risen((high - input) / length);
                 (length * share, slope)
             }
             Self::Convex => {
                 let (share, slope) = risen((input - low) / length);
-                (length * (1.0 - share), slope)
+                (length * (T::of(1.0) - share), slope)
             }
         }
     }
@@ -123,13 +140,14 @@ impl Bend {
 
 /// 1 - t^3 and the size of its slope, straight beyond 0 and 1.
 #[inline]
-fn risen(t: f64) -> (f64, f64) {
-    if t <= 0.0 {
-        (1.0, 0.0)
-    } else if t >= 1.0 {
-        (3.0 * (1.0 - t), 3.0)
+fn risen<T: Real>(t: T) -> (T, T) {
+    let [one, three] = [1.0, 3.0].map(T::of);
+    if t <= T::ZERO {
+        (one, T::ZERO)
+    } else if t >= one {
+        (three * (one - t), three)
     } else {
-        (1.0 - t * t * t, 3.0 * t * t)
+        (one - t * t * t, three * t * t)
     }
 }
 
@@ -170,46 +188,55 @@ const ROUNDING: f64 = 1e-12;
 /// below; with all signs turned it is strictly decreasing. The unit of the output is free; it is
 /// written Y here: V, or m for a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AsymmetricPlay<const PLAYS: usize> {
+pub struct AsymmetricPlay<const PLAYS: usize, T = f64> {
     /// Gain of the path without memory, `w_0`, Y/V, not 0.
-    pub linear: f64,
+    pub linear: T,
     /// Ends of the range in which f and g bend, V, ascending.
-    pub range: (f64, f64),
+    pub range: (T, T),
     /// Plays of u, f(u) and g(u), their weights in Y/V.
-    pub families: [PlayFamily<PLAYS>; 3],
+    pub families: [PlayFamily<PLAYS, T>; 3],
 }
 
 /// State of the operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AsymmetricPlayState<const PLAYS: usize> {
+pub struct AsymmetricPlayState<const PLAYS: usize, T = f64> {
     /// Input, V.
-    pub input: f64,
+    pub input: T,
     /// Output of each play of each family, V.
-    pub plays: [[f64; PLAYS]; 3],
+    pub plays: [[T; PLAYS]; 3],
     /// Slope of the output along the last section of the path, Y/V.
-    pub slope: f64,
+    pub slope: T,
 }
 
-crate::snapshot!([const PLAYS: usize] AsymmetricPlayState<PLAYS> { input, plays, slope });
+crate::snapshot!(
+    [const PLAYS: usize, T: Real] AsymmetricPlayState<PLAYS, T> { input, plays, slope }
+);
 
-impl<const PLAYS: usize> AsymmetricPlay<PLAYS> {
+impl<const PLAYS: usize> Cast for AsymmetricPlay<PLAYS> {
+    type In<T: Real> = AsymmetricPlay<PLAYS, T>;
+
+    fn cast<T: Real>(&self) -> Result<AsymmetricPlay<PLAYS, T>> {
+        let [straight, concave, convex] = &self.families;
+        Ok(AsymmetricPlay {
+            linear: rounded("linear", self.linear, "")?,
+            range: (rounded("range", self.range.0, "V")?, rounded("range", self.range.1, "V")?),
+            families: [straight.cast()?, concave.cast()?, convex.cast()?],
+        })
+    }
+}
+
+impl<const PLAYS: usize, T: Real> AsymmetricPlay<PLAYS, T> {
     /// The state before any input.
     #[must_use]
-    pub fn at_rest(&self) -> AsymmetricPlayState<PLAYS> {
-        AsymmetricPlayState { input: 0.0, plays: [[0.0; PLAYS]; 3], slope: self.linear }
-    }
-
-    /// The families and what their plays follow.
-    #[inline]
-    fn parts(&self) -> impl Iterator<Item = (Bend, &PlayFamily<PLAYS>)> {
-        Bend::ALL.into_iter().zip(&self.families).filter(|(_, family)| family.count > 0)
+    pub fn at_rest(&self) -> AsymmetricPlayState<PLAYS, T> {
+        AsymmetricPlayState { input: T::ZERO, plays: [[T::ZERO; PLAYS]; 3], slope: self.linear }
     }
 
     /// Moves the input to `input` (V) and returns the output.
     ///
     /// Exact for a step of any length, provided that the input is monotone within it.
     #[inline]
-    pub fn follow(&self, state: &mut AsymmetricPlayState<PLAYS>, input: f64) -> f64 {
+    pub fn follow(&self, state: &mut AsymmetricPlayState<PLAYS, T>, input: T) -> T {
         let rises = input >= state.input;
         *state = self.taken(state, input, rises);
         self.value(state)
@@ -219,10 +246,10 @@ impl<const PLAYS: usize> AsymmetricPlay<PLAYS> {
     #[inline]
     fn taken(
         &self,
-        from: &AsymmetricPlayState<PLAYS>,
-        input: f64,
+        from: &AsymmetricPlayState<PLAYS, T>,
+        input: T,
         rises: bool,
-    ) -> AsymmetricPlayState<PLAYS> {
+    ) -> AsymmetricPlayState<PLAYS, T> {
         let mut state = AsymmetricPlayState { input, slope: self.linear, ..*from };
         for ((bend, family), plays) in Bend::ALL.iter().zip(&self.families).zip(&mut state.plays) {
             if family.count == 0 {
@@ -231,12 +258,12 @@ impl<const PLAYS: usize> AsymmetricPlay<PLAYS> {
             let (edge, rate) = bend.at(input, self.range);
             let settings = family.thresholds.iter().zip(&family.weights);
             for (play, (threshold, weight)) in plays.iter_mut().zip(settings).take(family.count) {
-                let (low, high) = (edge - threshold, edge + threshold);
+                let (low, high) = (edge - *threshold, edge + *threshold);
                 // A play moves with its input where it touches the side that pushes it.
                 let moves = if rises { low >= *play } else { high <= *play };
-                *play = low.max(high.min(*play));
+                *play = low.larger(high.smaller(*play));
                 if moves {
-                    state.slope += weight * rate;
+                    state.slope = state.slope + *weight * rate;
                 }
             }
         }
@@ -246,7 +273,7 @@ impl<const PLAYS: usize> AsymmetricPlay<PLAYS> {
     /// Output and slope where the input has gone from a state to `input` on a rise or a fall.
     #[must_use]
     #[inline]
-    pub fn ahead(&self, from: &AsymmetricPlayState<PLAYS>, input: f64, rises: bool) -> (f64, f64) {
+    pub fn ahead(&self, from: &AsymmetricPlayState<PLAYS, T>, input: T, rises: bool) -> (T, T) {
         let state = self.taken(from, input, rises);
         (self.value(&state), state.slope)
     }
@@ -254,11 +281,20 @@ impl<const PLAYS: usize> AsymmetricPlay<PLAYS> {
     /// Output of a state.
     #[must_use]
     #[inline]
-    pub fn value(&self, state: &AsymmetricPlayState<PLAYS>) -> f64 {
+    pub fn value(&self, state: &AsymmetricPlayState<PLAYS, T>) -> T {
         let weighted = self.families.iter().zip(&state.plays).map(|(family, plays)| {
-            family.with(plays).map(|(_, weight, play)| weight * play).sum::<f64>()
+            let parts = family.with(plays).map(|(_, weight, play)| weight * play);
+            parts.fold(T::of(-0.0), |sum, part| sum + part)
         });
-        self.linear * state.input + weighted.sum::<f64>()
+        self.linear * state.input + weighted.fold(T::of(-0.0), |sum, part| sum + part)
+    }
+}
+
+impl<const PLAYS: usize> AsymmetricPlay<PLAYS> {
+    /// The families and what their plays follow.
+    #[inline]
+    fn parts(&self) -> impl Iterator<Item = (Bend, &PlayFamily<PLAYS>)> {
+        Bend::ALL.into_iter().zip(&self.families).filter(|(_, family)| family.count > 0)
     }
 
     /// The end of the first part of the way to `input` (V) along which the output is a straight

@@ -5,8 +5,10 @@
 //! found between two places.
 
 use super::OperatorInverse;
-use crate::error::usable;
+use crate::cast::Cast;
+use crate::error::Result;
 use crate::hysteresis::{AsymmetricPlay, AsymmetricPlayState};
+use crate::number::Real;
 use crate::root::rising_root;
 
 /// Inverse of an [`AsymmetricPlay`]: output in, input out.
@@ -16,7 +18,7 @@ use crate::root::rising_root;
 /// use piezotrack_control::{AsymmetricPlayInverse, OperatorInverse};
 ///
 /// let family = PlayFamily { thresholds: [1.0, 2.0], weights: [0.3, 0.2], count: 2 };
-/// let operator = AsymmetricPlay { linear: 0.5, range: (0.0, 10.0), families: [family; 3] };
+/// let operator = AsymmetricPlay { linear: 0.5_f64, range: (0.0, 10.0), families: [family; 3] };
 /// let inverse = AsymmetricPlayInverse(operator);
 /// let (mut there, mut back) = (operator.at_rest(), inverse.rest());
 /// for input in [10.0, 2.0, 7.0, 6.5, 8.0, 0.0, -3.0, 14.0] {
@@ -25,45 +27,56 @@ use crate::root::rising_root;
 /// }
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AsymmetricPlayInverse<const PLAYS: usize>(pub AsymmetricPlay<PLAYS>);
+pub struct AsymmetricPlayInverse<const PLAYS: usize, T = f64>(pub AsymmetricPlay<PLAYS, T>);
 
 /// Its state: that of the operator, and the output requested last.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AsymmetricPlayInverseState<const PLAYS: usize> {
-    operator: AsymmetricPlayState<PLAYS>,
-    output: f64,
+pub struct AsymmetricPlayInverseState<const PLAYS: usize, T = f64> {
+    operator: AsymmetricPlayState<PLAYS, T>,
+    output: T,
 }
 
-crate::snapshot!([const PLAYS: usize] AsymmetricPlayInverseState<PLAYS> { operator, output });
+crate::snapshot!(
+    [const PLAYS: usize, T: Real] AsymmetricPlayInverseState<PLAYS, T> { operator, output }
+);
 
-impl<const PLAYS: usize> AsymmetricPlayInverse<PLAYS> {
+impl<const PLAYS: usize> Cast for AsymmetricPlayInverse<PLAYS> {
+    type In<T: Real> = AsymmetricPlayInverse<PLAYS, T>;
+
+    fn cast<T: Real>(&self) -> Result<AsymmetricPlayInverse<PLAYS, T>> {
+        Ok(AsymmetricPlayInverse(self.0.cast()?))
+    }
+}
+
+impl<const PLAYS: usize, T: Real> AsymmetricPlayInverse<PLAYS, T> {
     /// The state for an operator in a given state.
     #[must_use]
     pub fn memory(
         &self,
-        operator: &AsymmetricPlayState<PLAYS>,
-    ) -> AsymmetricPlayInverseState<PLAYS> {
+        operator: &AsymmetricPlayState<PLAYS, T>,
+    ) -> AsymmetricPlayInverseState<PLAYS, T> {
         AsymmetricPlayInverseState { operator: *operator, output: self.0.value(operator) }
     }
 
     /// The input for an output.
     #[inline]
-    fn input(&self, from: &AsymmetricPlayState<PLAYS>, output: f64) -> f64 {
+    fn input(&self, from: &AsymmetricPlayState<PLAYS, T>, output: T) -> T {
         let (here, linear) = (self.0.value(from), self.0.linear);
-        let turn = linear.signum();
+        let sign = |rises: bool| T::of(if rises { 1.0 } else { -1.0 });
+        let turn = sign(linear > T::ZERO);
         // In the direction in which the output rises with the way; falling weights turn it.
-        let up = if output >= here { 1.0 } else { -1.0 };
+        let up = sign(output >= here);
         let side = up * turn;
-        let way = |way: f64| {
-            let (value, slope) = self.0.ahead(from, from.input + side * way, side > 0.0);
+        let way = |way: T| {
+            let (value, slope) = self.0.ahead(from, from.input + side * way, side > T::ZERO);
             (up * (value - output), turn * slope)
         };
         from.input + side * rising_root((output - here).abs() / linear.abs(), way)
     }
 }
 
-impl<const PLAYS: usize> OperatorInverse for AsymmetricPlayInverse<PLAYS> {
-    type State = AsymmetricPlayInverseState<PLAYS>;
+impl<const PLAYS: usize, T: Real> OperatorInverse<T> for AsymmetricPlayInverse<PLAYS, T> {
+    type State = AsymmetricPlayInverseState<PLAYS, T>;
 
     fn rest(&self) -> Self::State {
         self.memory(&self.0.at_rest())
@@ -73,13 +86,13 @@ impl<const PLAYS: usize> OperatorInverse for AsymmetricPlayInverse<PLAYS> {
     /// of 2^-50 of what the output's change would be over `linear` alone, in 100 steps at most,
     /// and to rounding in the few that there are otherwise.
     #[inline]
-    fn follow(&self, state: &mut Self::State, output: f64) -> f64 {
-        if output - state.output == 0.0 {
+    fn follow(&self, state: &mut Self::State, output: T) -> T {
+        if output - state.output == T::ZERO {
             return state.operator.input;
         }
-        let volts = if usable(output) { self.input(&state.operator, output) } else { f64::NAN };
+        let volts = if output.is_usable() { self.input(&state.operator, output) } else { T::NAN };
         if !volts.is_finite() {
-            return f64::NAN;
+            return T::NAN;
         }
         self.0.follow(&mut state.operator, volts);
         state.output = output;
