@@ -2,16 +2,19 @@
 //! reaches is what they call.
 
 use piezotrack_control::disturbance_observer::Observed;
-use piezotrack_control::hysteresis::{AsymmetricBoucWen, BoucWen, Dahl, LuGre, Play};
+use piezotrack_control::hysteresis::{
+    AsymmetricBoucWen, AsymmetricPlay, BoucWen, Dahl, LuGre, Play, PlayFamily,
+};
 use piezotrack_control::inverse::{NetworkNumbers, NeuralNetworkInverse};
 use piezotrack_control::unfused::Unfused;
 use piezotrack_control::{
-    AsymmetricBoucWenInverse, BoucWenInverse, Cast, Creep, CreepingInverse, DahlInverse, Damped,
-    DisturbanceObserver, Dynamics, Feedback, FeedbackSample, FirstOrderDahlInverse,
-    HysteresisObserved, HysteresisObserver, IntegralResonantControl, Inverse, LeadLag, Limits,
-    LuGreInverse, OnlineFeedforward, OnlineFeedforwardState, OscillatorInverse,
-    ParallelDahlInverse, Pid, PrandtlIshlinskiiInverse, ReferenceSample, Result,
-    SampledDahlInverse, SampledPid, SampledSlidingMode, ScheduledPid, SlidingMode, StateSpace,
+    AsymmetricBoucWenInverse, AsymmetricPlayInverse, BoucWenInverse, Cast, Creep, CreepingInverse,
+    DahlInverse, Damped, DisturbanceObserver, Dynamics, Feedback, FeedbackSample,
+    FirstOrderDahlInverse, HysteresisObserved, HysteresisObserver, InputInverse,
+    IntegralResonantControl, Inverse, LeadLag, Limits, LuGreInverse, OnlineFeedforward,
+    OnlineFeedforwardState, OscillatorInverse, ParallelDahlInverse, Pid, PrandtlIshlinskiiInverse,
+    ReferenceSample, Result, SampledDahlInverse, SampledPid, SampledSlidingMode, ScheduledPid,
+    SlidingMode, StateSpace,
 };
 
 const DT: f64 = 1e-3;
@@ -64,6 +67,7 @@ struct Parts {
     dahl_observed: Law<HysteresisObserved<Dahl<Single>, SampledPid<f32>, f32>>,
     bouc_wen_observed: Law<HysteresisObserved<BoucWen<Single>, SampledPid<f32>, f32>>,
     plays: Ahead<PrandtlIshlinskiiInverse<2, 1, 1, f32>>,
+    asymmetric_plays: Ahead<InputInverse<AsymmetricPlayInverse<2, f32>, 0, f32>>,
     creeping: Ahead<CreepingInverse<SampledDahlInverse<f32>, 1, f32>>,
     friction: Ahead<FirstOrderDahlInverse<f32>>,
     parallel: Ahead<ParallelDahlInverse<f32>>,
@@ -83,6 +87,7 @@ fn parts() -> Result<Parts> {
     let observer = DisturbanceObserver::new(1.3e-6, 2e-3, 20.0)?;
     let resonant = IntegralResonantControl::new(1e8, 2e-5)?;
     let dahl = Dahl { a1: 1e3, a2: 1e6, gain: 2e9 };
+    let family = PlayFamily { thresholds: [2.0, 6.0], weights: [0.06e-6, 0.03e-6], count: 2 };
     let bouc_wen = BoucWen { rise: 0.1, beta: 0.04, gamma: 0.03, exponent: 1.5 };
     let play = Play {
         linear: 1e-6,
@@ -127,6 +132,17 @@ fn parts() -> Result<Parts> {
                 .around(sampled, DT)?
                 .cast()?,
         ),
+        asymmetric_plays: Ahead::new(InputInverse::<_, 0>::with(
+            AsymmetricPlayInverse(AsymmetricPlay {
+                linear: 1e-6,
+                range: (0.0, 75.0),
+                families: [family; 3],
+            }),
+            0.0,
+            &[],
+            Dynamics::None,
+            DT,
+        )?)?,
         plays: Ahead::new(PrandtlIshlinskiiInverse::<2, 1, 1>::new(&play, &creep, dynamics, DT)?)?,
         creeping: Ahead::new(CreepingInverse::<_, 1>::new(
             DahlInverse::xu_li_2010().at(DT)?,
@@ -196,6 +212,7 @@ pub extern "C" fn parts_volts(reference: f32, measured: f32) -> f32 {
         + parts.dahl_observed.step(&sample)
         + parts.bouc_wen_observed.step(&sample);
     laws + parts.plays.step(&ahead, limits)
+        + parts.asymmetric_plays.step(&ahead, limits)
         + parts.creeping.step(&ahead, limits)
         + parts.friction.step(&ahead, limits)
         + parts.parallel.step(&ahead, limits)
