@@ -147,84 +147,142 @@ pub trait Real: Number<Lane = Self> + PartialOrd + Default + Debug + Into<f64> +
     }
 }
 
-impl Number for f64 {
-    type Lane = Self;
+/// Implements both traits for a real type, with functions of libm by their names, and items that only
+/// that type has.
+macro_rules! real {
+    (
+        $real:ident, $huge:literal, $fma:ident, $sqrt:ident, $ln:ident, $ln_1p:ident, $exp:ident,
+        $exp_m1:ident, $pow:ident, $tanh:ident, $copysign:ident, { $($own:item)* }
+    ) => {
+        impl Number for $real {
+            type Lane = Self;
 
-    #[inline(always)]
-    fn like(self, value: f64) -> Self {
-        value
-    }
+            #[inline(always)]
+            fn like(self, value: f64) -> Self {
+                Real::of(value)
+            }
 
-    #[inline(always)]
-    fn each(self, value: Self) -> Self {
-        value
-    }
+            #[inline(always)]
+            fn each(self, value: Self) -> Self {
+                value
+            }
 
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        #[cfg(feature = "std")]
-        return f64::mul_add(self, factor, term);
-        #[cfg(not(feature = "std"))]
-        return libm::fma(self, factor, term);
-    }
+            #[inline(always)]
+            fn mul_add(self, factor: Self, term: Self) -> Self {
+                #[cfg(feature = "std")]
+                return $real::mul_add(self, factor, term);
+                #[cfg(not(feature = "std"))]
+                return libm::$fma(self, factor, term);
+            }
 
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        libm::sqrt(self)
-    }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                libm::$sqrt(self)
+            }
 
-    #[inline]
-    fn lanewise<const A: usize>(
-        arguments: [Self; A],
-        function: impl Fn([Self; A]) -> Self,
-    ) -> Self {
-        function(arguments)
-    }
+            #[inline]
+            fn lanewise<const A: usize>(
+                arguments: [Self; A],
+                function: impl Fn([Self; A]) -> Self,
+            ) -> Self {
+                function(arguments)
+            }
 
-    #[inline(always)]
-    fn where_negative(self, yes: Self, no: Self) -> Self {
-        if self < 0.0 { yes } else { no }
-    }
+            #[inline(always)]
+            fn where_negative(self, yes: Self, no: Self) -> Self {
+                if self < 0.0 { yes } else { no }
+            }
 
-    #[inline(always)]
-    fn any_negative(self) -> bool {
-        self < 0.0
-    }
+            #[inline(always)]
+            fn any_negative(self) -> bool {
+                self < 0.0
+            }
 
-    #[inline(always)]
-    fn all_within(self, low: Self, high: Self) -> bool {
-        low <= self && self <= high
-    }
+            #[inline(always)]
+            fn all_within(self, low: Self, high: Self) -> bool {
+                low <= self && self <= high
+            }
 
-    #[inline(always)]
-    fn lane(&self, _lane: usize) -> Self {
-        *self
-    }
+            #[inline(always)]
+            fn lane(&self, _lane: usize) -> Self {
+                *self
+            }
 
-    #[inline(always)]
-    fn by_lane(self, mut values: impl FnMut(usize) -> Self) -> Self {
-        values(0)
-    }
+            #[inline(always)]
+            fn by_lane(self, mut values: impl FnMut(usize) -> Self) -> Self {
+                values(0)
+            }
 
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        if self < other { other } else { self }
-    }
+            #[inline(always)]
+            fn larger(self, other: Self) -> Self {
+                if self < other { other } else { self }
+            }
 
-    #[inline(always)]
-    fn smaller(self, other: Self) -> Self {
-        if other < self { other } else { self }
-    }
+            #[inline(always)]
+            fn smaller(self, other: Self) -> Self {
+                if other < self { other } else { self }
+            }
+        }
+
+        impl Real for $real {
+            const ZERO: Self = 0.0;
+            const INFINITY: Self = Self::INFINITY;
+            const NAN: Self = Self::NAN;
+            const EPSILON: Self = Self::EPSILON;
+            const MIN_POSITIVE: Self = Self::MIN_POSITIVE;
+            const HUGE: Self = $huge;
+
+            $($own)*
+
+            #[inline(always)]
+            fn abs(self) -> Self {
+                self.abs()
+            }
+
+            #[inline(always)]
+            fn is_sign_negative(self) -> bool {
+                self.is_sign_negative()
+            }
+
+            #[inline]
+            fn ln(self) -> Self {
+                libm::$ln(self)
+            }
+
+            #[inline]
+            fn ln_1p(self) -> Self {
+                libm::$ln_1p(self)
+            }
+
+            #[inline]
+            fn exp(self) -> Self {
+                libm::$exp(self)
+            }
+
+            #[inline]
+            fn exp_m1(self) -> Self {
+                libm::$exp_m1(self)
+            }
+
+            #[inline]
+            fn pow(self, exponent: Self) -> Self {
+                libm::$pow(self, exponent)
+            }
+
+            #[inline]
+            fn tanh(self) -> Self {
+                libm::$tanh(self)
+            }
+
+            #[inline]
+            fn copysign(self, other: Self) -> Self {
+                libm::$copysign(self, other)
+            }
+        }
+    };
 }
 
-impl Real for f64 {
-    const ZERO: Self = 0.0;
-    const INFINITY: Self = Self::INFINITY;
-    const NAN: Self = Self::NAN;
-    const EPSILON: Self = Self::EPSILON;
-    const MIN_POSITIVE: Self = Self::MIN_POSITIVE;
-    const HUGE: Self = 1e100;
-
+real!(f64, 1e100, fma, sqrt, log, log1p, exp, expm1, pow, tanh, copysign, {
     #[inline(always)]
     fn of(value: f64) -> Self {
         value
@@ -234,131 +292,9 @@ impl Real for f64 {
     fn count(count: u32) -> Self {
         Self::from(count)
     }
+});
 
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.abs()
-    }
-
-    #[inline(always)]
-    fn is_sign_negative(self) -> bool {
-        self.is_sign_negative()
-    }
-
-    #[inline]
-    fn ln(self) -> Self {
-        libm::log(self)
-    }
-
-    #[inline]
-    fn ln_1p(self) -> Self {
-        libm::log1p(self)
-    }
-
-    #[inline]
-    fn exp(self) -> Self {
-        libm::exp(self)
-    }
-
-    #[inline]
-    fn exp_m1(self) -> Self {
-        libm::expm1(self)
-    }
-
-    #[inline]
-    fn pow(self, exponent: Self) -> Self {
-        libm::pow(self, exponent)
-    }
-
-    #[inline]
-    fn tanh(self) -> Self {
-        libm::tanh(self)
-    }
-
-    #[inline]
-    fn copysign(self, other: Self) -> Self {
-        libm::copysign(self, other)
-    }
-}
-
-impl Number for f32 {
-    type Lane = Self;
-
-    #[inline(always)]
-    fn like(self, value: f64) -> Self {
-        Real::of(value)
-    }
-
-    #[inline(always)]
-    fn each(self, value: Self) -> Self {
-        value
-    }
-
-    #[inline(always)]
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        #[cfg(feature = "std")]
-        return f32::mul_add(self, factor, term);
-        #[cfg(not(feature = "std"))]
-        return libm::fmaf(self, factor, term);
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        libm::sqrtf(self)
-    }
-
-    #[inline]
-    fn lanewise<const A: usize>(
-        arguments: [Self; A],
-        function: impl Fn([Self; A]) -> Self,
-    ) -> Self {
-        function(arguments)
-    }
-
-    #[inline(always)]
-    fn where_negative(self, yes: Self, no: Self) -> Self {
-        if self < 0.0 { yes } else { no }
-    }
-
-    #[inline(always)]
-    fn any_negative(self) -> bool {
-        self < 0.0
-    }
-
-    #[inline(always)]
-    fn all_within(self, low: Self, high: Self) -> bool {
-        low <= self && self <= high
-    }
-
-    #[inline(always)]
-    fn lane(&self, _lane: usize) -> Self {
-        *self
-    }
-
-    #[inline(always)]
-    fn by_lane(self, mut values: impl FnMut(usize) -> Self) -> Self {
-        values(0)
-    }
-
-    #[inline(always)]
-    fn larger(self, other: Self) -> Self {
-        if self < other { other } else { self }
-    }
-
-    #[inline(always)]
-    fn smaller(self, other: Self) -> Self {
-        if other < self { other } else { self }
-    }
-}
-
-impl Real for f32 {
-    const ZERO: Self = 0.0;
-    const INFINITY: Self = Self::INFINITY;
-    const NAN: Self = Self::NAN;
-    const EPSILON: Self = Self::EPSILON;
-    const MIN_POSITIVE: Self = Self::MIN_POSITIVE;
-    const HUGE: Self = 1e30;
-
+real!(f32, 1e30, fmaf, sqrtf, logf, log1pf, expf, expm1f, powf, tanhf, copysignf, {
     #[expect(clippy::cast_possible_truncation, reason = "rounded to the nearest")]
     #[inline(always)]
     fn of(value: f64) -> Self {
@@ -370,49 +306,4 @@ impl Real for f32 {
     fn count(count: u32) -> Self {
         count as Self
     }
-
-    #[inline(always)]
-    fn abs(self) -> Self {
-        self.abs()
-    }
-
-    #[inline(always)]
-    fn is_sign_negative(self) -> bool {
-        self.is_sign_negative()
-    }
-
-    #[inline]
-    fn ln(self) -> Self {
-        libm::logf(self)
-    }
-
-    #[inline]
-    fn ln_1p(self) -> Self {
-        libm::log1pf(self)
-    }
-
-    #[inline]
-    fn exp(self) -> Self {
-        libm::expf(self)
-    }
-
-    #[inline]
-    fn exp_m1(self) -> Self {
-        libm::expm1f(self)
-    }
-
-    #[inline]
-    fn pow(self, exponent: Self) -> Self {
-        libm::powf(self, exponent)
-    }
-
-    #[inline]
-    fn tanh(self) -> Self {
-        libm::tanhf(self)
-    }
-
-    #[inline]
-    fn copysign(self, other: Self) -> Self {
-        libm::copysignf(self, other)
-    }
-}
+});
