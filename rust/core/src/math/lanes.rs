@@ -30,18 +30,7 @@ impl<S: Simd, const K: usize> Lanes<S, K> {
     /// The value that `values` gives for each lane.
     #[inline(always)]
     pub fn gather(simd: S, values: impl Fn(usize) -> f64) -> Self {
-        let mut out = Self::splat(simd, 0.0);
-        for (lane, slot) in out.as_mut_slice().iter_mut().enumerate() {
-            *slot = values(lane);
-        }
-        out
-    }
-
-    /// As many lanes, each with the value that `values` gives for it.
-    #[inline(always)]
-    #[must_use]
-    pub fn each(self, values: impl Fn(usize) -> f64) -> Self {
-        Self::gather(self.simd, values)
+        Self::splat(simd, 0.0).by_lane(values)
     }
 
     /// The lanes in order.

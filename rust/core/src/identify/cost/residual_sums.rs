@@ -220,8 +220,9 @@ impl<'a, const V: usize, S: Simd, R> ResidualSums<'a, V, S, R> {
                 let time = candidates.get(lane).or(candidates.last())?.theta.drift_time()?;
                 Some(Fading::new(time, of.record.drive.dt, of.record.window.len()))
             };
-            let of_lane =
-                |number: fn(Fading) -> f64| zero.each(|lane| fading(lane).map_or(f64::NAN, number));
+            let of_lane = |number: fn(Fading) -> f64| {
+                zero.by_lane(|lane| fading(lane).map_or(f64::NAN, number))
+            };
             Drifting::new(of_lane(|fading| fading.keep), of_lane(|fading| fading.less))
         });
         let (last, reading) = ([zero; 2], reading());
@@ -450,7 +451,7 @@ impl<const V: usize, S: Simd> Delayed<V, S> {
             FractionalDelay::new(delay, dt)
         };
         let whole: Vec<usize> = (0..Lanes::<S, V>::COUNT).map(|lane| late(lane).whole).collect();
-        let part = zero.each(|lane| late(lane).part);
+        let part = zero.by_lane(|lane| late(lane).part);
         let length = whole.iter().max().unwrap_or(&0) + 2;
         // At rest before the first sample.
         Self { past: vec![[start, zero]; length], whole, part, substeps }
@@ -464,7 +465,7 @@ impl<const V: usize, S: Simd> Reading<Lanes<S, V>> for Delayed<V, S> {
         self.past[k % length] = [x, w * w.like(self.substeps)];
         let (past, whole) = (&self.past, &self.whole);
         let read = |i: usize, more: usize| {
-            x.each(|lane| past[(k + length - whole[lane] - more) % length][i].as_slice()[lane])
+            x.by_lane(|lane| past[(k + length - whole[lane] - more) % length][i].as_slice()[lane])
         };
         between(read(0, 1), read(1, 1), read(0, 0), read(1, 0), self.part)
     }
