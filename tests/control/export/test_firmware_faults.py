@@ -269,7 +269,7 @@ def test_a_client_that_does_not_read_is_hung_up_on(
 @needs_cross
 @pytest.mark.slow
 def test_answers_that_a_client_does_not_read_do_not_stop_a_board(tmp_path: Path) -> None:
-    """What does not leave is dropped, a line is never a mixture of two, and sampling goes on."""
+    """Output that does not leave is dropped, no line is a mixture of two, sampling goes on."""
     one, path = controller(), tmp_path / "link"
     place = f"unix:{path.name},server=on,wait=off"
     with (

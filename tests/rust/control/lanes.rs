@@ -1,6 +1,7 @@
 //! Loops whose controllers go in lanes beside loops whose controllers are stepped by themselves.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+use super::tune;
 use piezotrack_control::{Controller, Filter, Limits, Pid, Repetitive, Smoothing, Span};
 use piezotrack_core::models::Model;
 use piezotrack_core::parts::Law;
@@ -132,23 +133,8 @@ fn agree(task: &Task<'_>, all: &[Controller<Law>], place: &str) -> f64 {
 }
 
 fn task<'a>(stage: &'a VirtualStage, dt: f64, samples: ReferenceSamples<'a>) -> Task<'a> {
-    let timing = Timing {
-        interval: dt,
-        samples: samples.reference.len(),
-        delay: 0.0,
-        jitter: 0.0,
-        substeps: 1,
-    };
-    Task {
-        stage,
-        voltages_before: &[],
-        timing,
-        samples,
-        beside: &[],
-        shown_at: 0.0,
-        from: 50,
-        error: ErrorSignal::Measured,
-    }
+    let plain = tune::task(stage, samples, 0.0);
+    Task { timing: Timing { interval: dt, ..plain.timing }, from: 50, ..plain }
 }
 
 fn wave() -> Vec<f64> {

@@ -97,7 +97,7 @@ fn added(one: &SampledPid, rows: &[[f64; 3]], commands: &[Command]) -> f64 {
     inputs + U * (6.0 * products + volts + 4.0 * one.tracking() * sum)
 }
 
-/// What the roundings of an incremental law add up to, V: each sample rounds the output that it
+/// Sum of the roundings of an incremental law, V: each sample rounds the output that it
 /// changes, by up to `U` of it, evenly to either side, so that the variance is a third of the
 /// square. Four standard deviations of their sum, and a rounding of what is asked for; what an error
 /// was rounded by cancels in the next difference.

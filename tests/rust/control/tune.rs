@@ -38,7 +38,7 @@ fn controllers(count: u32) -> Vec<Controller<Law>> {
         .collect()
 }
 
-fn task<'a>(stage: &'a VirtualStage, samples: ReferenceSamples<'a>, delay: f64) -> Task<'a> {
+pub fn task<'a>(stage: &'a VirtualStage, samples: ReferenceSamples<'a>, delay: f64) -> Task<'a> {
     let timing =
         Timing { interval: DT, samples: samples.reference.len(), delay, jitter: 0.0, substeps: 1 };
     Task {

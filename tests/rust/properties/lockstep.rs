@@ -97,7 +97,7 @@ impl<T: Real> Number for Four<T> {
     }
 }
 
-/// What comes in at a sample: usual nearly always, so that most steps go in lanes.
+/// Inputs of a sample: usual nearly always, so that most steps go in lanes.
 #[derive(Clone, Debug)]
 struct Sample {
     reference: f64,

@@ -1,10 +1,10 @@
 //! Modes that regressors move beside the drives.
 
 use numpy::PyArray1;
-use piezotrack_core::simulate::{DistortedModes, DistortedState, ModalState, RegressorState};
+use piezotrack_core::simulate::{DistortedModes, DistortedState, RegressorState};
 use pyo3::prelude::*;
 
-use super::modal_system::{Parts, PyModalSystem, complex};
+use super::modal_system::{Parts, PyModalSystem, complex, modal_state};
 use super::regressors::PyRegressors;
 use crate::conversions::arrays::{array, samples};
 use crate::enter::enter;
@@ -47,17 +47,14 @@ impl PyDistortedModes {
         state: State<'py>,
         drive: &Bound<'py, PyAny>,
     ) -> PyResult<Simulated<'py>> {
-        let modes = |parts: &Parts<'py>| -> PyResult<ModalState> {
-            Ok(ModalState {
-                real: samples("state", &parts.0)?,
-                imaginary: samples("state", &parts.1)?,
-            })
-        };
         let (last, values) = &state.2;
         let memory =
             RegressorState { last: samples("state", last)?, values: samples("state", values)? };
-        let mut state =
-            DistortedState { modes: modes(&state.0)?, forced: modes(&state.1)?, memory };
+        let mut state = DistortedState {
+            modes: modal_state(&state.0)?,
+            forced: modal_state(&state.1)?,
+            memory,
+        };
         let drive = samples("drive", drive)?;
         let outputs = enter(py, |_| self.0.simulate(&mut state, &drive))?;
         let pair = |first: Vec<f64>, second: Vec<f64>| -> PyResult<Pair<'py>> {

@@ -46,6 +46,10 @@ pub(super) fn complex(name: &str, (real, imaginary): &Parts<'_>) -> PyResult<Vec
     Ok(real.into_iter().zip(imaginary).map(|(re, im)| [re, im]).collect())
 }
 
+pub(super) fn modal_state((real, imaginary): &Parts<'_>) -> PyResult<ModalState> {
+    Ok(ModalState { real: samples("state", real)?, imaginary: samples("state", imaginary)? })
+}
+
 #[pymethods]
 impl PyModalSystem {
     /// Poles, and the vectors b and c of each mode after each other, as real and imaginary parts.
@@ -75,10 +79,7 @@ impl PyModalSystem {
         state: Parts<'py>,
         drive: &Bound<'py, PyAny>,
     ) -> PyResult<Simulated<'py>> {
-        let mut state = ModalState {
-            real: samples("state", &state.0)?,
-            imaginary: samples("state", &state.1)?,
-        };
+        let mut state = modal_state(&state)?;
         let drive = samples("drive", drive)?;
         let outputs = enter(py, |_| self.0.simulate(&mut state, &drive))?;
         Ok((
