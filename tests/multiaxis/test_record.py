@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,6 +64,16 @@ def test_realisations_that_repeat_each_other_are_refused() -> None:
         pt.multiaxis.approximate_axes(record(u=same, y=same))
 
 
+def test_what_leaks_into_a_line_does_not_excite_it() -> None:
+    # An amplifier's distortion, 54 dB below the lines: a response there would be noise over it.
+    made = VirtualAxes.xu_li_2010(noise=1e-9, seed=1).record(realisations=2, samples=256)
+    free = np.setdiff1d(np.arange(1, 128), made.lines())[-1]
+    size = 2e-3 * np.abs(np.fft.rfft(made.u[:, 0, 0, 0])).max() / 128
+    leak = size * np.cos(2 * np.pi * free * np.arange(256) / 256)
+    leaking = replace(made, u=made.u + leak[:, np.newaxis, np.newaxis, np.newaxis])
+    np.testing.assert_array_equal(leaking.lines(), made.lines())
+
+
 def test_drives_that_do_not_repeat_are_refused() -> None:
     with pytest.raises(pt.DataError, match=r"periods of the drives differ by .* % of their rms"):
         pt.multiaxis.approximate_axes(record())
@@ -97,7 +108,7 @@ def test_a_file_of_arrays_is_read_in_um(tmp_path: Any) -> None:
     np.savez(path, u_1=NOISE, y_1=NOISE)
     read = MultiAxisRecord.from_npz(path, drive="u_1", output="y_1", dt=1e-3)
     assert np.array_equal(read.y, 1e-6 * NOISE)
-    with pytest.raises(pt.DataError, match="has no array 'y_2': expected one of u_1, y_1"):
+    with pytest.raises(pt.DataError, match=r"has no array 'y_2': expected .* u_1, y_1"):
         MultiAxisRecord.from_npz(path, drive="u_1", output="y_2", dt=1e-3)
     with pytest.raises(pt.DataError, match="cannot be read"):
         MultiAxisRecord.from_npz(tmp_path / "none.npz", drive="u", output="y", dt=1e-3)

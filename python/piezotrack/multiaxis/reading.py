@@ -40,7 +40,7 @@ def read_axes(
         Logs of any format that `pt.read` takes, each with columns of all drives and displacements;
         or ``.npz`` files of records, as of `MultiAxisRecord.from_npz`.
     drives, displacements : sequence of str or int
-        The columns; of a record, one array each.
+        The columns; of records, an array each, in pairs of drives and their displacements.
     period : float, optional
         Period of the drives [s]; found by default. The last whole periods of a log are taken.
     **reading : object
@@ -83,16 +83,17 @@ def read_axes(
     if not files:
         raise ParameterError("paths", "an empty list", "a log or more")
     given = None if period is None else positive("period", period, "s")
-    single = len(drives) == len(displacements) == 1
-    records = sorted(
-        (
-            _record(file, str(drives[0]), str(displacements[0]), given, reading)
-            if single and are_axes(file, str(drives[0]), str(displacements[0]))
-            else _realisation(file, drives, displacements, given, reading)
-            for file in files
-        ),
-        key=lambda one: one.level,
-    )
+    records: list[MultiAxisRecord] = []
+    for file in files:
+        pairs = [(str(drive), str(one)) for drive, one in zip(drives, displacements, strict=False)]
+        if not all(are_axes(file, *pair) for pair in pairs):
+            records.append(_realisation(file, drives, displacements, given, reading))
+            continue
+        if len(drives) != len(displacements):
+            expected = f"{len(drives)}, one for each of the drives"
+            raise ParameterError("displacements", f"{len(displacements)} arrays", expected)
+        records += [_record(file, *pair, given, reading) for pair in pairs]
+    records.sort(key=lambda one: one.level)
     levels: list[list[MultiAxisRecord]] = [[records[0]]]
     for record in records[1:]:
         if record.level < DISTINCT * levels[-1][0].level:
@@ -103,16 +104,21 @@ def read_axes(
 
 
 def are_axes(file: str | os.PathLike[str], drive: str, displacement: str) -> bool:
-    """Whether a file of NumPy has arrays of several axes, or of several realisations, so called."""
+    """Whether a file of NumPy has arrays of several axes, or of several realisations, so called.
+
+    Where none is so called, others of realisations count.
+    """
     if not str(file).lower().endswith(".npz"):
         return False
     try:
         with np.load(file, allow_pickle=False) as arrays:
-            shapes = [arrays[name].shape for name in (drive, displacement) if name in arrays.files]
+            named = [arrays[name].shape for name in (drive, displacement) if name in arrays.files]
+            others = [] if named else [arrays[name].shape for name in arrays.files]
     except (OSError, ValueError):
         # What is wrong with it is said where it is read.
         return False
-    return any(len(shape) > 2 or (len(shape) == 2 and shape[1] > 1) for shape in shapes)
+    wide = any(len(shape) == 2 and shape[1] > 1 for shape in named)
+    return wide or any(len(shape) > 2 for shape in (*named, *others))
 
 
 def _record(

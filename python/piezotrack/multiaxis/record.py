@@ -79,7 +79,7 @@ class MultiAxisRecord:
     source: str | None = None
 
     # Ratio of a line to the largest below which it is not excited.
-    EXCITED: ClassVar[float] = 1e-3
+    EXCITED: ClassVar[float] = 3e-3
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dt", check_dt(self.dt))
@@ -229,8 +229,8 @@ class MultiAxisRecord:
                 missing = [name for name in (drive, output) if name not in arrays.files]
                 if missing:
                     raise DataError(
-                        f"{path} has no array {missing[0]!r}: expected one of "
-                        f"{', '.join(arrays.files)}"
+                        f"{path} has no array {missing[0]!r}: expected drives and displacements "
+                        f"among {', '.join(arrays.files)}"
                     )
                 u, y = arrays[drive], arrays[output]
                 own = arrays["dt"] if "dt" in arrays.files else None

@@ -87,6 +87,21 @@ def test_records_are_read_from_arrays() -> None:
     np.testing.assert_allclose(model.static_gain(), gains, atol=1e-9)
 
 
+@pytest.mark.usefixtures("_no_pictures")
+def test_arrays_of_one_file_are_levels() -> None:
+    arrays: dict[str, Any] = {}
+    for name, level in (("a", 0.5), ("b", 1.0)):
+        with np.load(saved("one.npz", level=level)) as one:
+            arrays |= {f"u_{name}": one["u"], f"y_{name}": one["y"], "dt": one["dt"]}
+    np.savez("both.npz", **arrays)
+    names = ("--drive", "u_a,u_b", "--displacement", "y_a,y_b")
+    ran("identify", "both.npz", *names, "-o", "found")
+    model = pt.multiaxis.load_axes(Path("found", "axes.json"))
+    assert [one.level for one in model.levels] == pytest.approx([0.5, 1.0], rel=1e-6)
+    assert "no array 'u': expected drives" in refusal("identify", "both.npz")
+    assert "1 arrays: expected 2" in refusal("identify", "both.npz", *names[:3], "y_a")
+
+
 @pytest.mark.parametrize(
     ("changes", "arguments", "words"),
     [
@@ -98,7 +113,7 @@ def test_records_are_read_from_arrays() -> None:
         ({"dt": np.ones(2)}, [], "no number 'dt'"),
         ({"y": np.ones((255, 2, 4, 2))}, [], "r.npz: y has 255 samples: expected 256"),
         ({"y": np.ones((256, 2, 3, 2))}, [], "r.npz: y has 3 realisations: expected 4"),
-        ({"y": None}, [], "has no array 'y': expected one of u, dt"),
+        ({"y": None}, [], "has no array 'y': expected drives and displacements among u, dt"),
         ({}, ["--displacement", "x"], "has no array 'x'"),
         ({}, ["--skip", "2"], "--skip is given for r.npz: expected dt and the unit"),
         ({}, ["--period", "256ms"], "--period is given for r.npz: expected none"),
