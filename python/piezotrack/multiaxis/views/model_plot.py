@@ -17,7 +17,7 @@ from ..._support.display.plot_style import (
     trace,
     whole,
 )
-from ..._support.units import drive_text, shown_unit
+from ..._support.units import best_length_unit, drive_text, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -91,8 +91,10 @@ def plot_tracking(run: MultiAxisTracking, fig: Figure | SubFigure | None = None)
     time = run.dt * np.arange(len(run.y), dtype=np.float64)
     for k, (name, ax) in enumerate(axes.items()):
         style = {**MODELS[k % len(MODELS)], "linestyle": "-", "linewidth": 1.3, "label": "actual"}
-        trace(ax, time, 1e6 * run.y[:, k], style)
-        trace(ax, time, 1e6 * run.reference[:, k], DESIRED, ylabel=f"{name} [um]")
+        signals = run.y[:, k], run.reference[:, k]
+        unit, scale = best_length_unit(max(float(np.abs(one).max()) for one in signals))
+        trace(ax, time, scale * signals[0], style)
+        trace(ax, time, scale * signals[1], DESIRED, ylabel=f"{name} [{unit}]")
     list(axes.values())[-1].set_xlabel("time [s]")
     legend_inside(next(iter(axes.values())), ncols=2)
     caption(figure, run.note, "medium")

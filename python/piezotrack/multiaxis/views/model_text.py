@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..._support.units import drive_text, shown_unit
+from ..._support.units import best_length_unit, drive_text, shown_unit
 
 if TYPE_CHECKING:
     from ..loop.closed_loop import MultiAxisTracking
@@ -90,10 +90,14 @@ def _frequency_sd(model: MultiAxisModel, one: AxesLevel, k: int) -> float:
 
 def axes_tracking_text(run: MultiAxisTracking) -> str:
     """Write the loop, and the errors of each axis."""
-    lines = [f"{run.note}", "axis  max um  rms um  off its reference, of the largest stroke"]
+    unit, scale = best_length_unit(max(figures.max_error for figures in run.metrics))
+    lines = [
+        f"{run.note}",
+        f"axis  max {unit}  rms {unit}  off its reference, of the largest stroke",
+    ]
     for k, (figures, share) in enumerate(zip(run.metrics, run.cross_coupling, strict=True)):
         lines.append(
-            f"{k:>4}  {1e6 * figures.max_error:>6.3f}  {1e6 * figures.rms_error:>6.3f}  "
+            f"{k:>4}  {scale * figures.max_error:>6.3f}  {scale * figures.rms_error:>6.3f}  "
             f"{100 * share:.2f} %"
         )
     return "\n".join(lines)
