@@ -207,7 +207,9 @@ def test_a_run_is_printed_and_saved(stage: VirtualAxes, tmp_path: Path) -> None:
     columns = np.loadtxt(tmp_path / "axes_run.csv", delimiter=",", skiprows=1)
     assert columns.shape == (300, 10)
     assert columns[:, 4:7] == pytest.approx(1e6 * run.y, abs=1e-9)
-    assert f"{1e6 * run.metrics[0].max_error:.3f}" in run.summary()
+    # Errors below 1 um are in nm.
+    assert "max nm" in run.summary()
+    assert f"{1e9 * run.metrics[0].max_error:.3f}" in run.summary()
     assert "stable, Ms" in run.summary()
 
 
