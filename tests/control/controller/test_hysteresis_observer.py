@@ -83,6 +83,26 @@ def test_to_control_is_the_law_that_runs_where_the_operator_is_straight() -> Non
     np.testing.assert_allclose(volts, expected, atol=1e-9)
 
 
+def test_the_bandwidth_is_that_of_the_motion() -> None:
+    # Of a straight operator the loop is linear: a sine of the bandwidth comes out 3 dB smaller.
+    stage = replace(BOUC_WEN, beta=0.0, gamma=0.0)
+    law = HysteresisObserver(stage=stage, pid=PI, correction=0.2)
+    bandwidth = pt.check_loop(stage, loop(law)).middle.bandwidth
+    assert bandwidth is not None
+    sine = pt.sine(frequency=bandwidth, low=30e-6, high=32e-6, duration=40.0 / bandwidth)
+    run = pt.track(stage, loop(law), sine)
+    late = run.t > 0.5 * run.t[-1]
+    turn = np.exp(-2j * np.pi * bandwidth * run.t[late])
+    waves = [
+        np.linalg.lstsq(
+            np.column_stack([turn.real, turn.imag, np.ones(turn.size)]), signal[late], rcond=None
+        )[0][:2]
+        for signal in (run.displacement, run.desired)
+    ]
+    came, asked = (float(np.hypot(*wave)) for wave in waves)
+    assert came / asked == pytest.approx(np.sqrt(0.5), rel=0.01)
+
+
 def test_what_cannot_be_observed_is_refused() -> None:
     with pytest.raises(pt.ParameterError, match="stage is Prandtl"):
         HysteresisObserver(

@@ -65,9 +65,10 @@ class LoopCheck:
     crossover : float or None
         Highest frequency at which its gain is 1 [Hz].
     bandwidth : float or None
-        Lowest frequency at which the closed loop of the feedback without the repetitive part,
-        L/(1 + L), is 3 dB below 1 [Hz]; None of an unstable loop, of one that is below at low
-        frequencies already, and of one that never is.
+        Lowest frequency at which the closed loop of the feedback without feedforward and
+        repetitive part is 3 dB below 1 [Hz]: L/(1 + L), or P C/(1 + L) of a law in which only a
+        part C of what closes the loop tracks, as beside damping and a hysteresis observer. None of
+        an unstable loop, of one that is below at low frequencies already, and of one that never is.
     sensitivity : float
         Ms, the largest amplification of a disturbance.
     slowest_root : float or None
@@ -165,7 +166,7 @@ class LoopResponse:
     frequency : ndarray, shape (n,)
         Frequencies [Hz].
     open_loop, sensitivity, complementary : ndarray of complex, shape (n,)
-        L, 1/(1 + L) and L/(1 + L) of the whole loop.
+        L, 1/(1 + L) and L/(1 + L) of the whole loop, the last as `LoopCheck.bandwidth` has it.
     learning : ndarray, shape (n,)
         Share of an error that remains after a period; 0 without a repetitive part.
     """

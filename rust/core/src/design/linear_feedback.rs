@@ -120,39 +120,49 @@ impl<F: LinearFeedback> LinearFeedback for Damped<F> {
     }
 }
 
-/// At the larger slope s of the operator, about a point: w^ = Hy y + Hu u of the observer, so that
-/// u/e = (C - Hy)/(1 - Hu) around the law C. The states are x^, w^ and the last two voltages.
+/// w^ = Hy y + Hu u of the observer, at the larger slope s of the operator, about a point. The states
+/// are x^, w^ and the last two voltages.
+fn observed<O: ObservedOperator, F>(law: &HysteresisObserved<O, F>) -> [Ratio; 2] {
+    let ([p, g, l], [_, slope]) = (law.coefficients(), law.slopes());
+    // Of x-, x^, w- and w^ the weights of x^, w^, v[k-1], v[k-2] before and of y.
+    let sum = |pairs: &[(f64, [f64; 5])]| -> [f64; 5] {
+        std::array::from_fn(|i| pairs.iter().map(|(factor, row)| factor * row[i]).sum())
+    };
+    let unit = |at: usize| -> [f64; 5] { std::array::from_fn(|i| f64::from(u8::from(i == at))) };
+    let [x, w, last, before, y] = [0, 1, 2, 3, 4].map(unit);
+    let along_drive = sum(&[(1.0, w), (slope, last), (-slope, before)]);
+    let at = if law.is_of_drive() { along_drive } else { w };
+    let ahead = sum(&[(p, x), (g, last), (-g, at)]);
+    let place = sum(&[(1.0 - l, ahead), (l, y)]);
+    let along_path = sum(&[(1.0, w), (slope, place), (-slope, x)]);
+    let moved = if law.is_of_drive() { along_drive } else { along_path };
+    let estimate = sum(&[(1.0 - l, moved), (l, last), (l * p / g, x), (-l / g, y)]);
+
+    let rows = [place, estimate, [0.0; 5], last];
+    let change = DMatrix::from_fn(4, 4, |i, j| rows[i][j] - f64::from(u8::from(i == j)));
+    let column = |numbers: [f64; 4]| DVector::from_column_slice(&numbers);
+    let out = column([estimate[0], estimate[1], estimate[2], estimate[3]]);
+    let of_y = Ratio::of_matrices(&change, &column(rows.map(|row| row[4])), &out, estimate[4]);
+    let of_u = Ratio::of_matrices(&change, &column([0.0, 0.0, 1.0, 0.0]), &out, 0.0);
+    [of_y, of_u]
+}
+
+/// u/e = (C - Hy)/(1 - Hu) around the law C; from the reference alone it is C/(1 - Hu).
 impl<O: ObservedOperator, F: LinearFeedback> LinearFeedback for HysteresisObserved<O, F> {
     fn transfer_function(&self) -> [Vec<f64>; 2] {
-        let ([p, g, l], [_, slope]) = (self.coefficients(), self.slopes());
-        // Of x-, x^, w- and w^ the weights of x^, w^, v[k-1], v[k-2] before and of y.
-        let sum = |pairs: &[(f64, [f64; 5])]| -> [f64; 5] {
-            std::array::from_fn(|i| pairs.iter().map(|(factor, row)| factor * row[i]).sum())
-        };
-        let unit =
-            |at: usize| -> [f64; 5] { std::array::from_fn(|i| f64::from(u8::from(i == at))) };
-        let [x, w, last, before, y] = [0, 1, 2, 3, 4].map(unit);
-        let along_drive = sum(&[(1.0, w), (slope, last), (-slope, before)]);
-        let at = if self.is_of_drive() { along_drive } else { w };
-        let ahead = sum(&[(p, x), (g, last), (-g, at)]);
-        let place = sum(&[(1.0 - l, ahead), (l, y)]);
-        let along_path = sum(&[(1.0, w), (slope, place), (-slope, x)]);
-        let moved = if self.is_of_drive() { along_drive } else { along_path };
-        let estimate = sum(&[(1.0 - l, moved), (l, last), (l * p / g, x), (-l / g, y)]);
-
-        let rows = [place, estimate, [0.0; 5], last];
-        let change = DMatrix::from_fn(4, 4, |i, j| rows[i][j] - f64::from(u8::from(i == j)));
-        let column = |numbers: [f64; 4]| DVector::from_column_slice(&numbers);
-        let out = column([estimate[0], estimate[1], estimate[2], estimate[3]]);
-        let of_y = Ratio::of_matrices(&change, &column(rows.map(|row| row[4])), &out, estimate[4]);
-        let of_u = Ratio::of_matrices(&change, &column([0.0, 0.0, 1.0, 0.0]), &out, 0.0);
-
+        let [of_y, of_u] = observed(self);
         let [above, below] = self.inner().transfer_function();
         let mut top = product(&above, &of_y.below);
         add(&mut top, -1.0, &product(&below, &of_y.above));
         let mut bottom = of_u.below;
         add(&mut bottom, -1.0, &of_u.above);
         [top, product(&below, &bottom)]
+    }
+
+    fn reference_numerator(&self) -> Option<Vec<f64>> {
+        let [of_y, _] = observed(self);
+        let [above, _] = self.inner().transfer_function();
+        Some(product(&above, &of_y.below))
     }
 }
 
