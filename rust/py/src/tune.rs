@@ -215,6 +215,7 @@ struct FoundSettings {
     history: Vec<f64>,
     searches: usize,
     agreeing: usize,
+    spread: Vec<f64>,
 }
 
 impl FoundSettings {
@@ -232,6 +233,7 @@ impl FoundSettings {
             history: found.history.clone(),
             searches: found.searches,
             agreeing: found.agreeing,
+            spread: found.spread.clone(),
         }
     }
 }

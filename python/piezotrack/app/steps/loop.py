@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._support.units import best_length_unit, decibels, length_text
+from ...control.views.tuning import searches_text
 from ...errors import PiezotrackError
 from .. import parts
 from ..code import Code, call, command, plain
@@ -243,7 +244,7 @@ def _words(desk: Desk, report: LoopReport) -> Part:
         tuned, full = known
         active = ", ".join(tuned.active_constraints)
         words = f"active: {active}" if active else "no constraint is active: the error is the least"
-        agree = f"; {tuned.agreeing} of {tuned.searches} searches agree" if full else ""
+        agree = f"; {searches_text(tuned)}" if full else ""
         items.append(parts.message("green", words + agree))
     for name, one in report.cases:
         stable, words = _case(desk, one)

@@ -244,6 +244,7 @@ def _simulated(problem: TuningProblem, best: Solution, solutions: list[Solution]
         history=tuple(best.outcome["history"]),
         searches=best.outcome["searches"],
         agreeing=best.outcome["agreeing"],
+        spread=tuple(best.outcome["spread"]),
         other_kind=_on_other_kind(problem, best),
         bandwidths=tuple(
             check_loop(axis.stages[0], controller, delay=axis.timing.delay).middle.bandwidth

@@ -128,6 +128,9 @@ class Tuned(Result):
         Best figure after each iteration; infinite as long as no candidate kept the margins.
     searches, agreeing : int
         Searches from different sides, and how many of them end within 2 % of the best.
+    spread : tuple of float
+        By how much each of them ends above the best, as a share of it, the least first; infinite
+        where one keeps not what is required. A last search, which begins with all, has the best.
     bandwidths : tuple of (float or None)
         Bandwidth of the feedback of each controller on the stage at its middle gain [Hz], as of
         `check_loop`.
@@ -154,6 +157,7 @@ class Tuned(Result):
     history: tuple[float, ...]
     searches: int
     agreeing: int
+    spread: tuple[float, ...]
     bandwidths: tuple[float | None, ...]
     unit: str = "m"
     other_kind: OtherKind | None = None
@@ -216,6 +220,7 @@ class Tuned(Result):
             "other_kind": None if self.other_kind is None else self.other_kind._asdict(),
             "searches": self.searches,
             "agreeing": self.agreeing,
+            "spread": [one if math.isfinite(one) else None for one in self.spread],
             "provenance": {"package": "piezotrack", "version": _core.__version__},
         }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from ..tuning.schedule import Schedule
     from ..tuning.tuned import Tuned
 
-__all__ = ["plot_schedule", "plot_tuned", "schedule_text", "tuned_text"]
+__all__ = ["plot_schedule", "plot_tuned", "schedule_text", "searches_text", "tuned_text"]
 
 
 def tuned_text(tuned: Tuned) -> str:
@@ -45,8 +46,7 @@ def tuned_text(tuned: Tuned) -> str:
     lines = [
         *gains,
         f"{tuned.minimised}, at {rate:.6g} Hz: {tuned.candidates} controllers evaluated, "
-        f"{tuned.loops} loops simulated; {tuned.agreeing} of {tuned.searches} searches end within "
-        "2 % of the best",
+        f"{tuned.loops} loops simulated; {searches_text(tuned)}",
     ]
     if tuned.runs:
         scale, unit = _shown(tuned)
@@ -72,6 +72,14 @@ def tuned_text(tuned: Tuned) -> str:
     active = active or "none: the minimum lies inside the bounds"
     lines.append(f"active constraints: {active}")
     return "\n".join(lines)
+
+
+def searches_text(tuned: Tuned) -> str:
+    """Write how near to the best the nearer half of the searches end."""
+    half = sorted(tuned.spread)[(len(tuned.spread) - 1) // 2]
+    if not math.isfinite(half):
+        return f"fewer than half of {tuned.searches} searches keep what is required"
+    return f"half of {tuned.searches} searches end within {100.0 * half:.2g} % of the best"
 
 
 @drawing

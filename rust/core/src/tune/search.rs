@@ -12,7 +12,7 @@ use super::judge::{Judge, Ready};
 use super::requirements::{PlantSet, Requirements, Robustness};
 use super::run_metrics::RunMetrics;
 use super::settings::{Setting, Settings, Sought, Template};
-use super::sides::{ROUNDS, Run, Side, Tried, agreeing};
+use super::sides::{ROUNDS, Run, Side, Tried, agreeing, spread};
 use crate::error::{Error, Result, not_negative, positive};
 use crate::parts::Law;
 use crate::signal::{Stop, index};
@@ -100,6 +100,9 @@ pub struct Found {
     pub searches: usize,
     /// How many of them end within 2 % of the best.
     pub agreeing: usize,
+    /// By how much each of them ends above the best, as a share of it, the least first; infinite where
+    /// one keeps not what is required.
+    pub spread: Vec<f64>,
 }
 
 /// Fewest candidates that a search begins with: a trial is made of four.
@@ -155,7 +158,7 @@ impl Tuning<'_> {
                 history.push(kept.map(|(_, best)| best.cost).fold(f64::INFINITY, f64::min));
             }
         }
-        let (searches, agreeing) = agreeing(&runs);
+        let ((searches, agreeing), spread) = (agreeing(&runs), spread(&runs));
         let best = runs.into_iter().filter_map(|run| run.best);
         let best = best.min_by(|(_, a), (_, b)| a.rank().total_cmp(&b.rank()));
         let none = || Error::Numerical("no controller could be built from the settings".into());
@@ -173,6 +176,7 @@ impl Tuning<'_> {
             history,
             searches,
             agreeing,
+            spread,
         })
     }
 

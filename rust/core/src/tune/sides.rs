@@ -169,6 +169,19 @@ impl Run {
     }
 }
 
+/// By how much the best of each independent search is above the best of all, as a share of that, the
+/// least first; infinite where a search keeps not what is required, and the best does.
+pub(super) fn spread(runs: &[Run]) -> Vec<f64> {
+    let best = runs.iter().map(Run::rank).fold(f64::INFINITY, f64::min);
+    let kept = |run: &Run| run.best.as_ref().is_some_and(|(_, one)| one.excess <= 1.0);
+    let any = runs.iter().any(kept);
+    let independent = runs.iter().filter(|run| run.side != Side::Joint);
+    let above = |run: &Run| if kept(run) == any { run.rank() / best - 1.0 } else { f64::INFINITY };
+    let mut shares: Vec<f64> = independent.map(above).collect();
+    shares.sort_by(f64::total_cmp);
+    shares
+}
+
 /// How many independent searches there are, and how many of them end within 2 % of the best.
 pub(super) fn agreeing(runs: &[Run]) -> (usize, usize) {
     let best = runs.iter().map(Run::rank).fold(f64::INFINITY, f64::min);
