@@ -340,6 +340,7 @@ class Controller:
         law: tuple[str, list[float]] | None,
         repetitive: tuple[str, list[float]] | None,
         filters: list[tuple[str, list[float]]],
+        follows: bool,
     ) -> Controller: ...
     @property
     def line_length(self) -> int: ...

@@ -82,6 +82,13 @@ PARTS: dict[str, dict[str, Any]] = {
             pid=PI, velocity_gain=-0.1e6, position_gain=0.2e6, frequency=9.0, damping_ratio=0.6
         )
     },
+    "Dahl with damping": {
+        "feedforward": DAHL.inverse(),
+        "feedback": pt.control.PositivePositionFeedback(
+            pid=PI, gain=0.2e6, frequency=7.0, damping_ratio=0.6
+        ),
+        "filters": [pt.LowPass(20.0)],
+    },
     "repetitive": {"feedback": PI, "repetitive": learner(period=5.0, kq=0.3, tq=0.05)},
     "repetitive, part of a sample": {
         "feedback": PI,

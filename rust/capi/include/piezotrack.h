@@ -102,7 +102,8 @@ typedef struct {
   size_t filter_count;
   /**
    * Model of the stage whose inverse is the feedforward, by its name as in Python
-   * ("prandtl-ishlinskii"), or "neural network"; NULL for no feedforward.
+   * ("prandtl-ishlinskii"), or "neural network"; NULL for no feedforward. With it the filters of
+   * the last three laws act on the deviation from the reference, also in `piezotrack_step_given`.
    */
   const char *model;
   /**

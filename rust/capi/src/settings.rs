@@ -63,7 +63,8 @@ pub struct Settings {
     /// How many there are, 2 at most.
     pub filter_count: usize,
     /// Model of the stage whose inverse is the feedforward, by its name as in Python
-    /// ("prandtl-ishlinskii"), or "neural network"; NULL for no feedforward.
+    /// ("prandtl-ishlinskii"), or "neural network"; NULL for no feedforward. With it the filters of
+    /// the last three laws act on the deviation from the reference, also in `piezotrack_step_given`.
     pub model: *const c_char,
     /// Parameters of the model, by their names; lists and what is optional may be left out. Names
     /// and units are those of the stage's class in Python: "prandtl-ishlinskii" has `linear` (m/V),
@@ -105,6 +106,7 @@ pub unsafe fn parts(
             law: named("law", &settings.law)?,
             repetitive: named("repetitive", &settings.repetitive)?,
             filters: list("filters", settings.filters, settings.filter_count)?,
+            follows: !settings.model.is_null(),
         };
         let Some(model) = text("model", settings.model)? else {
             no_model(settings)?;

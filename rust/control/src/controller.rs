@@ -43,6 +43,9 @@ pub struct Controller<F, T = f64> {
     pub repetitive: Option<SampledRepetitive<T>>,
     /// Filters of the measurement, one after the other.
     pub filters: [Option<Filter<T>>; 2],
+    /// Whether the feedforward makes the stage follow the reference, as an inverse does: a law that
+    /// damps acts on what is left then, the deviation from the reference. False by default.
+    pub follows: bool,
 }
 
 /// State of a [`Controller`]; `L` is the delay line of the repetitive part, `[T; 0]` for a
@@ -144,6 +147,7 @@ impl<F: Cast> Cast for Controller<F> {
             feedback: self.feedback.cast()?,
             repetitive: self.repetitive.as_ref().map(SampledRepetitive::cast).transpose()?,
             filters,
+            follows: self.follows,
         })
     }
 }
@@ -152,7 +156,8 @@ impl<F: Feedback<T>, T: Real> Controller<F, T> {
     /// A controller of limits and feedback only; set the public fields for more.
     #[must_use]
     pub fn new(limits: Limits<T>, feedback: F) -> Self {
-        Self { limits, span: Span::default(), feedback, repetitive: None, filters: [None; 2] }
+        let (span, filters) = (Span::default(), [None; 2]);
+        Self { limits, span, feedback, repetitive: None, filters, follows: false }
     }
 
     /// The initial state, with the feedback part at 0 V.
@@ -251,7 +256,9 @@ impl<F: Feedback<T>, T: Real> Controller<F, T> {
                 *memory = None;
             }
         }
-        let same = self.filters == next.filters && self.repetitive == next.repetitive;
+        let same = self.filters == next.filters
+            && self.repetitive == next.repetitive
+            && self.follows == next.follows;
         if state.stepped && !(kept && same) {
             state.present = Some(next.limits.clip(state.voltage()));
             state.apart = true;
@@ -319,9 +326,16 @@ impl<F: Feedback<T>, T: Real> Controller<F, T> {
         if measurement_ok && reference_fits {
             let measured = self.filtered(&mut state.filters, measured);
             error = reference - measured;
-            let (excess, feedforward) = (state.excess, used + repetitive);
-            let sample =
-                FeedbackSample { error, reference, measured, excess, applied, feedforward };
+            let (excess, feedforward, follows) = (state.excess, used + repetitive, self.follows);
+            let sample = FeedbackSample {
+                error,
+                reference,
+                measured,
+                excess,
+                applied,
+                feedforward,
+                follows,
+            };
             let volts = self.feedback.step(&mut state.feedback, &sample);
             feedback = if volts.is_finite() { volts } else { feedback };
             state.unlearnt = error;

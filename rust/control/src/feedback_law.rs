@@ -25,6 +25,8 @@ pub struct FeedbackSample<T = f64> {
     pub applied: T,
     /// The other parts of this sample's command, feedforward and repetitive part, V.
     pub feedforward: T,
+    /// For damping: whether the feedforward makes the stage follow the reference already.
+    pub follows: bool,
 }
 
 impl<T: Real> FeedbackSample<T> {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import pickle
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -257,3 +258,76 @@ def test_a_law_recovers_after_saturation_and_bad_readings(name: str) -> None:
 def test_a_wrong_number_is_named(make: Any, sentence: str) -> None:
     with pytest.raises(pt.ParameterError, match=re.escape(sentence)):
         make()
+
+
+ROUGH = replace(STAGE, linear=0.92 * GAIN, frequency=1.06 * MODE)
+LINES = pt.triangle(frequency=25.0, low=20e-6, high=30e-6, duration=0.8)
+
+
+def followed(controller: pt.Controller) -> pt.control.Tracking:
+    return pt.track(STAGE, controller, LINES, timing=pt.Timing(delay=DELAY))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_beside_an_inverse_the_filter_acts_on_the_deviation_from_the_reference(name: str) -> None:
+    law = of(name)
+    run = followed(loop(law, feedforward=ROUGH.inverse()))
+    assert not np.any(run.saturated)
+    k, k_below, c = sampled(law)
+    n, d = plant()
+    ys, us, es, cs, ks = ([0.0] * 4 for _ in range(5))
+    expected: list[float] = []
+    for r, forward in zip(run.desired, run.feedforward, strict=True):
+        y = -np.dot(d[1:], ys[:3]) + np.dot(n[1:], us[:3])
+        ys, es = [y, *ys[:3]], [r - y, *es[:3]]
+        cs = [cs[0] + np.dot(c, es[:2]) if expected else c[0] * es[0] - PI.kp * es[0], *cs[:3]]
+        order = len(k_below)
+        # K (y - r): the loop of the tracking error alone, C - K
+        ks = [-np.dot(k, es[:order]) - np.dot(k_below[1:], ks[: order - 1]), *ks[:3]]
+        us = [forward + cs[0] + ks[0], *us[:3]]
+        expected.append(y)
+    np.testing.assert_allclose(run.displacement, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_with_an_inverse_it_follows_better_than_either_alone(name: str) -> None:
+    law, inverse = of(name, pt.Pid(kp=1e4, ti=1.2e-4, tt=DT)), ROUGH.inverse()
+    both, alone, open_loop = (
+        followed(one).metrics.rms_error
+        for one in (
+            loop(law, feedforward=inverse),
+            loop(law),
+            pt.Controller(dt=DT, limits=LIMITS, feedforward=inverse),
+        )
+    )
+    assert both < 0.5 * min(alone, open_loop)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_feedforward_changes_nothing_of_the_loop_and_nothing_is_added_where_the_stage_follows(
+    name: str,
+) -> None:
+    alone, both = loop(of(name)), loop(of(name), feedforward=STAGE.inverse())
+    one, other = (pt.check_loop(STAGE, each, delay=DELAY).middle for each in (alone, both))
+    assert one == other
+    session = both.start()
+    for k in range(300):
+        place = 20e-6 + 1e-6 * math.sin(0.1 * k)
+        session.step(place, place)
+        assert session.last.feedback == 0.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_to_control_of_a_controller_with_an_inverse_is_of_the_error_alone(name: str) -> None:
+    control = pytest.importorskip("control")
+    both = loop(of(name), feedforward=STAGE.inverse())
+    system = pt.to_control(both)
+    assert system.ninputs == 1
+    errors = 1e-7 * np.random.default_rng(3).standard_normal(80)
+    errors[0] = 0.0
+    session, volts = both.start(), []
+    for error in errors:
+        session.step(30e-6, 30e-6 - float(error), feedforward=30.0)
+        volts.append(session.last.feedback)
+    expected = control.forced_response(system, inputs=errors).outputs
+    np.testing.assert_allclose(volts, expected, atol=1e-9)

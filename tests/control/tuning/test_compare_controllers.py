@@ -49,11 +49,11 @@ def test_feedback_and_learning_beat_the_inverse_alone() -> None:
 def test_each_feedback_keeps_the_margins_and_each_step_is_timed() -> None:
     names = [
         "PID",
-        "PI + integral-resonant",
-        "PI + positive-position",
-        "PI + positive-velocity-position",
         "inverse + PD",
         "inverse + lead-lag",
+        "inverse + integral-resonant",
+        "inverse + positive-position",
+        "inverse + positive-velocity-position",
         "inverse + sliding-mode",
         "inverse + perturbation-estimator",
         "inverse + disturbance-observer",

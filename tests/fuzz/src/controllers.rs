@@ -64,6 +64,8 @@ fn controller(bytes: &mut Bytes<'_>) -> Option<Controller<Law>> {
         law: law.as_ref().map(|(name, numbers)| (*name, &numbers[..])),
         repetitive: smoothing.as_ref().map(|(name, numbers)| (*name, &numbers[..])),
         filters: filters.iter().map(|(name, numbers)| (*name, &numbers[..])).collect(),
+        // No byte of its own, so that what was kept reads as it did.
+        follows: filter_count == 1,
     };
     let made = parts.controller();
     if let Err(error) = &made {

@@ -21,9 +21,9 @@ SPELLINGS = {
     "inverse + disturbance observer": "inverse + disturbance-observer",
     "inverse + scheduled PID": "inverse + scheduled-pid",
     "PID + hysteresis observer": "PID + hysteresis-observer",
-    "PI + integral resonant control": "PI + integral-resonant",
-    "PI + positive position feedback": "PI + positive-position",
-    "PI + positive velocity and position feedback": "PI + positive-velocity-position",
+    "inverse + integral resonant control": "inverse + integral-resonant",
+    "inverse + positive position feedback": "inverse + positive-position",
+    "inverse + positive velocity and position feedback": "inverse + positive-velocity-position",
 }
 
 

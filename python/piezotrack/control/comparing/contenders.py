@@ -179,13 +179,6 @@ def _pid_alone(task: Task) -> list[Entry | None]:
     return task.each(task.tuned(inverse=None))
 
 
-def _damped(law: str) -> Maker:
-    def make(task: Task) -> list[Entry | None]:
-        return task.each(task.tuned(law=law, inverse=None))
-
-    return make
-
-
 def _observed(task: Task) -> list[Entry | None]:
     """Compensate an observed hysteresis on top of a PID with as much gain as the margins allow."""
     model = task.models["dahl"]
@@ -302,11 +295,11 @@ CONTENDERS: dict[str, Maker] = {
     "network": _network,
     "PID": _pid_alone,
     "PID + hysteresis-observer": _observed,
-    "PI + integral-resonant": _damped("integral-resonant"),
-    "PI + positive-position": _damped("positive-position"),
-    "PI + positive-velocity-position": _damped("positive-velocity-position"),
     "inverse + PD": _law("pd"),
     "inverse + lead-lag": _law("lead-lag"),
+    "inverse + integral-resonant": _law("integral-resonant"),
+    "inverse + positive-position": _law("positive-position"),
+    "inverse + positive-velocity-position": _law("positive-velocity-position"),
     "inverse + PID": _law("pid"),
     "inverse + PID + notch": _notched,
     "Dahl inverse + PID": _other("dahl"),

@@ -144,6 +144,7 @@ class Controller:
             law=None if self.feedback is None else self.feedback._settings,
             repetitive=None if self.repetitive is None else self.repetitive._settings,
             filters=[one._settings for one in self.filters],
+            follows=self.feedforward is not None,
         )
         object.__setattr__(self, "_core", core)
         object.__setattr__(self, "_valid", span or (-WIDEST, WIDEST))

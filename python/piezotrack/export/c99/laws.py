@@ -208,13 +208,17 @@ def disturbance_observer(numbers: Numbers, scale: Scale) -> Part:
     )
 
 
-def damping(numbers: Numbers, scale: Scale) -> Part:
-    """Make the damping filter of the measurement beside the PID."""
+def damping(numbers: Numbers, scale: Scale, *, follows: bool) -> Part:
+    """Make the damping filter beside the PID; `follows` of the deviation, beside an inverse."""
     b0, b1, b2, a1, a2 = numbers["damping"]
     unit = scale.unit
+    origin = (
+        Field("real", "damping_origin", "the first reading, m"),
+        Field("flag", "damping_begun", "whether there was a reading"),
+    )
     return Part(
         file="laws/damping.c",
-        chooses=("LAW_DAMPED", "TOLD_MEASURED"),
+        chooses=("LAW_DAMPED", "FOLLOWS" if follows else "TOLD_MEASURED"),
         settings=(
             scale.gain("DAMPING_B0", b0, "K = (b0 + b1/z + b2/z^2)/(1 + a1/z + a2/z^2)"),
             scale.gain("DAMPING_B1", b1, "b1"),
@@ -225,11 +229,10 @@ def damping(numbers: Numbers, scale: Scale) -> Part:
         fields=(
             Field("real", "damping_s1", f"memory of the filter, {unit}"),
             Field("real", "damping_s2", f"memory of the filter, {unit}"),
-            Field("real", "damping_origin", "the first reading, m"),
             Field("real", "damping_volts", f"the last output, {unit}"),
-            Field("flag", "damping_begun", "whether there was a reading"),
+            *(() if follows else origin),
         ),
-        operations=Operations(6, 5),
+        operations=Operations(6 - follows, 5),
     )
 
 

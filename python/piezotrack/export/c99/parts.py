@@ -278,13 +278,13 @@ def gains_of(controller: Controller) -> list[Part]:
     scale = Scale(unit, (high - low) / FINEST, high - low)
     parts = [filters(found["filters"])] if found["filters"] else []
     if _law_of(controller):
-        parts += _laws(found, scale)
+        parts += _laws(found, scale, follows=controller.feedforward is not None)
     if controller.repetitive is not None:
         parts.append(repetitive(found, unit))
     return parts
 
 
-def _laws(found: Numbers, scale: Scale) -> list[Part]:
+def _laws(found: Numbers, scale: Scale, *, follows: bool) -> list[Part]:
     """Make the parts of the feedback law, the inner one first."""
     if "b" in found:
         return [state_space(found, scale)]
@@ -294,5 +294,5 @@ def _laws(found: Numbers, scale: Scale) -> list[Part]:
     if "dahl-observer" in found:
         laws.append(dahl_observer(found, scale))
     if "damping" in found:
-        laws.append(damping(found, scale))
+        laws.append(damping(found, scale, follows=follows))
     return laws

@@ -18,7 +18,15 @@ CHOICES = (
     *("SINGLE", "TUNED", "FILTERED", "JUMPS", "REPEATS", "PAUSES", "LEADS"),
     *("FORWARD_TABLE", "FORWARD_ONLINE", "DELAYED", "DAHL_OPERATOR"),
     *("LAW_ANY", "LAW_PID", "LAW_SPACE", "LAW_SLIDING", "LAW_DISTURBANCE", "LAW_DAHL"),
-    *("CLOSED", "LAW_DAMPED", "BACK", "TOLD_MEASURED", "TOLD_APPLIED", "TOLD_FEEDFORWARD"),
+    *(
+        "CLOSED",
+        "LAW_DAMPED",
+        "FOLLOWS",
+        "BACK",
+        "TOLD_MEASURED",
+        "TOLD_APPLIED",
+        "TOLD_FEEDFORWARD",
+    ),
 )
 # Headers that are written for the choices, where the tree is compiled as it is.
 CHOSEN = ("choices.h", "constants.h")

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
+from ...control.laws.damping.damping_law import DampingLaw
 from ...errors import ParameterError
 from ..c99.check import FORWARD
 from ..c99.parts import parts_of, shape_of
@@ -151,6 +152,13 @@ def without_table(controller: Controller) -> Controller:
     except ParameterError as error:
         if error.argument != "feedforward":
             raise
+        if isinstance(controller.feedback, DampingLaw):
+            raise ParameterError(
+                "feedforward",
+                "left to the client",
+                "one with a form in C, or another law: this one damps the deviation from the "
+                "reference where the board has the inverse",
+            ) from error
         return replace(controller, feedforward=None, span=sensor_span(controller))
     return controller
 

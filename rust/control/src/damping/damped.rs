@@ -2,11 +2,14 @@
 //!
 //! ```text
 //! uFB[k] = uC[k] + K (y - y0)[k]
+//! uFB[k] = uC[k] + K (y - r)[k]     beside a feedforward that makes the stage follow r
 //! ```
 //!
 //! The law inside has the antiwindup, for the whole command; the filter's memory is of readings
 //! only, and does not wind up. Counted from the first reading, the filter makes no step where the
-//! law starts, and is kept out of the voltage at which it starts.
+//! law starts, and is kept out of the voltage at which it starts. Such a feedforward is for the stage
+//! without K, which is to be 0 V where the stage follows; r is outside of the loop, whose roots and
+//! margins are those of the other form.
 
 use crate::cast::Cast;
 use crate::error::Result;
@@ -27,7 +30,7 @@ pub struct Damped<F, T = f64> {
 pub struct DampedState<S, T = f64> {
     inner: S,
     filter: FilterState<T>,
-    /// y0, m; `None` before the first reading.
+    /// y0, m; `None` before the first reading, and where r takes its place.
     origin: Option<T>,
     /// The last output, V.
     volts: T,
@@ -87,8 +90,12 @@ impl<F: Feedback<T>, T: Real> Feedback<T> for Damped<F, T> {
 
     #[inline]
     fn step(&self, state: &mut Self::State, sample: &FeedbackSample<T>) -> T {
-        let origin = *state.origin.get_or_insert(sample.measured);
-        let damping = self.filter.step(&mut state.filter, sample.measured - origin);
+        let moved = if sample.follows {
+            -sample.error
+        } else {
+            sample.measured - *state.origin.get_or_insert(sample.measured)
+        };
+        let damping = self.filter.step(&mut state.filter, moved);
         let volts = self.inner.step(&mut state.inner, sample) + damping;
         if volts.is_finite() {
             state.volts = volts;

@@ -4,7 +4,8 @@
 //! uFB = C (r - y) + K (y - y0)
 //! ```
 //!
-//! C tracks, K damps; y0 is the first reading, so that K begins at 0 V. Each file has one K in
+//! C tracks, K damps; y0 is the first reading, so that K begins at 0 V, and r beside a feedforward that
+//! makes the stage follow it. Each file has one K in
 //! continuous time, [`damped`] what all of them share.
 
 pub mod damped;

@@ -33,6 +33,8 @@ pub struct ControllerParts<'a> {
     pub repetitive: Option<Named<'a>>,
     /// Filters of the measurement.
     pub filters: Vec<Named<'a>>,
+    /// Whether there is a feedforward beside it that makes the stage follow the reference.
+    pub follows: bool,
 }
 
 /// Checks the numbers of a part before a sampling interval is known: at the shortest, with which the
@@ -72,6 +74,7 @@ impl ControllerParts<'_> {
         if let Some((name, numbers)) = self.repetitive {
             controller.repetitive = Some(repetitive(name, numbers)?.at(dt)?);
         }
+        controller.follows = self.follows;
         let most = controller.filters.len();
         if self.filters.len() > most {
             return Err(Error::parameter("filters", self.filters.len(), format!("{most} at most")));

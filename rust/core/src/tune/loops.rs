@@ -293,9 +293,9 @@ impl<'a> Stepped<'a> {
 
 /// The controller as one of a PID, where it has one.
 fn with_pid(one: &Controller<Law>) -> Option<Controller<SampledPid>> {
-    let Controller { limits, span, ref feedback, repetitive, filters } = *one;
+    let Controller { limits, span, ref feedback, repetitive, filters, follows } = *one;
     let Law::Pid(feedback) = *feedback else { return None };
-    Some(Controller { limits, span, feedback, repetitive, filters })
+    Some(Controller { limits, span, feedback, repetitive, filters, follows })
 }
 
 fn rests<F: Feedback>(controllers: &[Controller<F>]) -> Result<States<F::State>> {

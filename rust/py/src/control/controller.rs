@@ -35,7 +35,7 @@ pub struct PyController {
 #[pymethods]
 impl PyController {
     #[new]
-    #[pyo3(signature = (*, dt, limits, span, max_jump, law, repetitive, filters))]
+    #[pyo3(signature = (*, dt, limits, span, max_jump, law, repetitive, filters, follows))]
     #[expect(clippy::needless_pass_by_value, reason = "as Python gives them")]
     fn new(
         dt: f64,
@@ -45,6 +45,7 @@ impl PyController {
         law: Option<NamedPart>,
         repetitive: Option<NamedPart>,
         filters: Vec<NamedPart>,
+        follows: bool,
     ) -> PyResult<Self> {
         let parts = ControllerParts {
             dt,
@@ -54,6 +55,7 @@ impl PyController {
             law: law.as_ref().map(borrowed),
             repetitive: repetitive.as_ref().map(borrowed),
             filters: filters.iter().map(borrowed).collect(),
+            follows,
         };
         let controller = parts.controller().map_err(|error| raise(&error))?;
         Ok(Self { controller, dt })

@@ -22,11 +22,14 @@ class IntegralResonantControl(DampingLaw):
     Aphale, Fleming and Moheimani 2007, doi 10.1088/0964-1726/16/2/023: a feedthrough of -d added to
     the displacement, and an integrator around both; seen from the stage alone, positive feedback of
     the low-passed displacement, of static gain 1/d and cutoff k d. K is sampled by Tustin's rule,
-    and counts from the first reading, so that a start has no bump. The antiwindup of the PID is for
-    the whole command, and K, which sees readings only, does not wind up.
+    and counts from the first reading y0, so that a start has no bump. The antiwindup of the PID is
+    for the whole command, and K, which sees readings only, does not wind up. Beside a feedforward,
+    which makes the stage follow as it is without K, r takes the place of y0: K acts on the
+    deviation, and is 0 V where there is none.
 
     `check_loop` opens the loop at the command, where it is P (C - K); its bandwidth is of
-    P C/(1 + P (C - K)), from the reference to the displacement. `to_control` gives both inputs.
+    P C/(1 + P (C - K)), from the reference to the displacement without feedforward. `to_control`
+    gives both inputs.
 
     Parameters
     ----------

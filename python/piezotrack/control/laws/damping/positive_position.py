@@ -21,8 +21,8 @@ class PositivePositionFeedback(DampingLaw):
         K(s) = \frac{g\,\omega_c^2}{s^2 + 2 \zeta_c \omega_c s + \omega_c^2}
 
     Fanson and Caughey 1990, doi 10.2514/3.10451. K is sampled by Tustin's rule, counts from the
-    first reading, and rolls off above the mode. Start, antiwindup, `check_loop` and `to_control`
-    are those of `IntegralResonantControl`.
+    first reading, or from r beside a feedforward, and rolls off above the mode. Start, antiwindup,
+    `check_loop` and `to_control` are those of `IntegralResonantControl`.
 
     Parameters
     ----------

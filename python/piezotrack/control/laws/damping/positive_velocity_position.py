@@ -24,8 +24,8 @@ class PositiveVelocityPositionFeedback(DampingLaw):
     scanners, IEEE Transactions on Control Systems Technology 15, whose gains are ``g1 wc`` and
     ``g2 wc^2``. The four numbers of K put the four poles of a mode with the filter anywhere.
     Without the velocity it is `PositivePositionFeedback`. K is sampled by Tustin's rule, and counts
-    from the first reading. Start, antiwindup, `check_loop` and `to_control` are those of
-    `IntegralResonantControl`.
+    from the first reading, or from r beside a feedforward. Start, antiwindup, `check_loop` and
+    `to_control` are those of `IntegralResonantControl`.
 
     Parameters
     ----------

@@ -13,6 +13,7 @@ from ....identification.fitted.identified_model import IdentifiedModel
 from ....stages.base import Stage
 from ....stages.virtual import VirtualStage
 from ...controller.controller import Controller
+from ...laws.damping.damping_law import DampingLaw
 from ...parts.part import FeedbackLaw
 from ...plant import linearised_plants, plant_of
 
@@ -38,7 +39,7 @@ def to_control(
     reversal, in the middle, the mean over its settled loop between `limits`, or at its highest.
     Hysteresis and creep are not in it. Of a `Controller` only the feedback law is taken, from the
     error to the voltage: no feedforward, no repetitive part, no filters, no limits. A law that
-    damps has the measurement as a second input.
+    damps has the measurement as a second input, but for that of a controller with a feedforward.
 
     Parameters
     ----------
@@ -183,6 +184,7 @@ def _held(
 
 def _feedback_law(part: Controller | FeedbackLaw, dt: float | None) -> Any:
     law: Any = part
+    follows = isinstance(part, Controller) and part.feedforward is not None
     if isinstance(part, Controller):
         if dt is not None:
             raise ParameterError("dt", dt, "none, the controller has its own")
@@ -193,7 +195,8 @@ def _feedback_law(part: Controller | FeedbackLaw, dt: float | None) -> Any:
         raise ParameterError("dt", "missing", "the sampling interval of the loop in s")
     dt = check_dt(dt)
     control = _control()
-    system = law._linear(dt)
+    of_deviation = follows and isinstance(law, DampingLaw)
+    system = FeedbackLaw._linear(law, dt) if of_deviation else law._linear(dt)
     made = (control.ss if len(system) == 4 else control.tf)(*system, dt)
     inputs = ["error_m", "measured_m"][: made.ninputs]
     return control.ss(made, name=law.info.title, inputs=inputs, outputs=["voltage_V"])
