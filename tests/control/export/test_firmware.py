@@ -459,3 +459,17 @@ def test_what_cannot_be_a_firmware_is_refused(tmp_path: Path) -> None:
     export(fast, tmp_path / "c99", to="c99", reference=motion, clock=168e6)
     slow = controller(dt=1e-3, feedforward=DAHL.inverse())
     assert export(slow, tmp_path, to="firmware", clock=168e6).most_instructions > 10_000  # type: ignore[operator]
+
+
+def test_a_damping_law_beside_a_feedforward_of_the_client_is_refused(tmp_path: Path) -> None:
+    # On the board it would take the motion that the client asks for as one to damp.
+    plays = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(5.0,), weights=(1e-7,))
+    law = loop("Dahl with damping").feedback
+    one = controller(feedback=law, filters=[])
+    pt.control.export_controller(one, tmp_path / "alone", to="firmware", name="axis")
+    with pytest.raises(ParameterError, match="feedforward is left to the client: expected"):
+        pt.control.export_controller(
+            replace(one, feedforward=plays.inverse()), tmp_path, to="firmware", name="axis"
+        )
+    dahl = replace(one, feedforward=DAHL.inverse())
+    pt.control.export_controller(dahl, tmp_path / "board", to="firmware", name="axis")

@@ -384,3 +384,27 @@ def test_what_the_exact_check_refuses_is_never_returned(monkeypatch: pytest.Monk
     monkeypatch.setattr(search, "SLACK", -0.9)
     with pytest.raises(pt.ParameterError, match=r"no gains whose exact margins .* (low|high) gain"):
         pt.tune(published_stage(), motion(), dt=0.02, limits=LIMITS, parts="pid", **QUICK)
+
+
+def test_how_near_its_searches_end_is_said_in_shares_of_what_was_found() -> None:
+    mode = pt.PrandtlIshlinskiiStage(
+        linear=1e-6, thresholds=(), weights=(), frequency=160.0, damping_ratio=0.02
+    )
+    tuned = pt.tune(
+        mode,
+        dt=2e-4,
+        limits=(0.0, 100.0),
+        law="positive-velocity-position",
+        parts="pid",
+        timing=pt.Timing(delay=1e-4),
+        search=pt.TuningSearch(particles=16, iterations=10),
+    )
+    assert len(tuned.spread) == tuned.searches
+    assert list(tuned.spread) == sorted(tuned.spread)
+    assert tuned.spread[0] >= 0.0
+    assert tuned.agreeing == sum(one <= 0.02 for one in tuned.spread)
+    # Half of four or six end as near as the second or third, whatever the others do.
+    nearer = 100.0 * tuned.spread[tuned.searches // 2 - 1]
+    assert f"half of {tuned.searches} searches end within {nearer:.1f} %" in tuned.summary()
+    written = [one if math.isfinite(one) else None for one in tuned.spread]
+    assert tuned.document()["spread"] == written
