@@ -58,8 +58,9 @@ def test_doubles_give_the_bits_of_rust(name: str, tmp_path: Path) -> None:
 
 @needs_gcc
 @pytest.mark.parametrize("inverse", [PLAYS.inverse(), DAHL.inverse()], ids=["plays", "Dahl"])
-def test_a_table_is_played(inverse: pt.Inverse, tmp_path: Path) -> None:
-    one = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=inverse, feedback=PI)
+@pytest.mark.parametrize("law", [PI, PARTS["Dahl with damping"]["feedback"]], ids=["PI", "damped"])
+def test_a_table_is_played(law: Any, inverse: pt.Inverse, tmp_path: Path) -> None:
+    one = pt.Controller(dt=0.02, limits=(0.0, 75.0), feedforward=inverse, feedback=law)
     export(one, tmp_path, name="axis", reference=SINE)
     compiled(tmp_path, "check.c", "axis.c")
     code, figures = checked(tmp_path)
