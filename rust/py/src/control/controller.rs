@@ -36,6 +36,7 @@ pub struct PyController {
 impl PyController {
     #[new]
     #[pyo3(signature = (*, dt, limits, span, max_jump, law, repetitive, filters, follows))]
+    #[expect(clippy::too_many_arguments, reason = "all named in Python")]
     #[expect(clippy::needless_pass_by_value, reason = "as Python gives them")]
     fn new(
         dt: f64,
