@@ -215,6 +215,12 @@ BAD: dict[str, tuple[str | bytes, dict[str, Any], int | None, tuple[str, ...]]] 
         2,
         ("'nan' in column 1",),
     ),
+    "a title too many": (
+        TEXT.replace("displacement_um", "temperature_C,displacement_um"),
+        {},
+        2,
+        ("3 fields, expected 4 as in line 1",),
+    ),
     "few fields": (with_line(3, "0.1,2.5"), {}, 3, ("2 fields, expected 3 as in line 1",)),
     "many fields": (with_line(3, "0.1,2.5,1,1"), {}, 3, ("4 fields, expected 3",)),
     "cut off": (with_line(5, "0.3,5"), {}, 5, ("2 fields", "may have been cut off")),

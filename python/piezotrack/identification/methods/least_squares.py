@@ -95,9 +95,12 @@ class LeastSquares:
             zones = _core.as_count("dead_zones", self.dead_zones)
             if zones > MOST_ZONES:
                 raise ParameterError("dead_zones", zones, f"up to {MOST_ZONES} dead zones")
-        if not isinstance(self.creep, bool) and self.creep != "auto":
+        automatic = isinstance(self.creep, str) and self.creep == "auto"
+        if not isinstance(self.creep, bool) and not automatic:
             object.__setattr__(self, "creep", as_numbers("creep", self.creep))
-        if self.dynamics not in (None, "auto", "first", "second"):
+        words = ("auto", "first", "second")
+        named = isinstance(self.dynamics, str) and self.dynamics in words
+        if self.dynamics is not None and not named:
             raise ParameterError(
                 "dynamics", quoted(self.dynamics), "'auto', None, 'first' or 'second'"
             )

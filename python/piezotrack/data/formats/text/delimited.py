@@ -278,8 +278,8 @@ class TextTable(Table):
             )
         except ValueError:
             return self._table_by_line(main, shape, swap)
-        needed = table[:, [column.index for column in main]]
-        if table.shape != shape or not np.isfinite(needed).all():
+        needed = [column.index for column in main]
+        if table.shape != shape or not np.isfinite(table[:, needed]).all():
             return self._table_by_line(main, shape, swap)
         return table
 
