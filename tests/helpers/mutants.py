@@ -7,6 +7,7 @@ import json
 import math
 import re
 import tempfile
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
 from functools import cache
@@ -225,7 +226,9 @@ def change_entry(draw: Draw, parent: Any, key: Any) -> None:
     elif how == 1 and isinstance(parent, dict):
         parent["x" * draw(st.integers(0, 3))] = old
     elif how == 2 and isinstance(old, (int, float)) and not isinstance(old, bool):
-        parent[key] = old * draw(st.sampled_from([-1, 0, 1e300, 1e-300, 2, 10**30]))
+        # An integer beyond all floats stays.
+        with suppress(OverflowError):
+            parent[key] = old * draw(st.sampled_from([-1, 0, 1e300, 1e-300, 2, 10**30]))
     elif how == 3 and isinstance(old, list):
         parent[key] = old * draw(st.sampled_from([2, 50])) + [None]
     elif how == 4:
