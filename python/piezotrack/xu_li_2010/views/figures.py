@@ -16,10 +16,11 @@ from ..._support.display.plot_style import (
     heading,
     legend_inside,
     panels,
+    sheet,
     whole,
 )
 from ..experiments.references import RULES
-from . import block_diagrams
+from .block_diagrams import plot_block_diagrams
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -71,7 +72,7 @@ def drawn(experiments: Experiments, drives: Drives | None) -> list[Drawn]:
             "fig_05",
             "Figs. 5 and 8 to 11: block diagrams",
             "As implemented here.",
-            block_diagrams.draw(),
+            plot_block_diagrams(),
         ),
         Drawn(
             "fig_06",
@@ -161,8 +162,8 @@ def _convergence(fit: Identification) -> Figure:
 @drawing
 def _drives(drives: Drives) -> Figure:
     """Draw the drives over the reference and, less the line, over time."""
-    figure = panels(None, (11.0, 4.6))
-    left, right = figure.subplots(1, 2)
+    figure, axes = sheet(None, (11.0, 4.6), (("reference", "time"),))
+    left, right = axes.values()
     # Two periods of 1 Hz.
     part = drives.t < drives.t[0] + 2.0
     t, um = drives.t[part], 1e6 * (drives.desired - drives.desired.mean())[part]
@@ -183,8 +184,8 @@ def _drives(drives: Drives) -> Figure:
 def plot_reproduction(reproduction: Reproduction, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw obtained over published of every number, with quartiles, in the order of the paper."""
     rows = reproduction.obtained
-    figure = panels(fig, (11.0, 5.0))
-    ax = figure.subplots()
+    figure, axes = sheet(fig, (11.0, 5.0), (("ratios",),))
+    ax = axes["ratios"]
     ratios = np.array([row.ratio for row in rows])
     quartiles = np.array([row.quartiles for row in rows]).T
     published = np.array([row.observable.published for row in rows])
@@ -198,7 +199,7 @@ def plot_reproduction(reproduction: Reproduction, fig: Figure | SubFigure | None
     ax.plot(places[~reached], ratios[~reached], **missed)
     figures = [row.observable.figure for row in rows]
     # As many names as have room beside each other.
-    apart, first = 0.14 * len(rows) / (whole(figure).get_figwidth() - 0.8), [0]
+    apart, first = 0.14 * len(rows) / (whole(ax.figure).get_figwidth() - 0.8), [0]
     for i, name in enumerate(figures):
         if name != figures[i - 1] and i - first[-1] >= apart:
             first.append(i)
