@@ -50,10 +50,12 @@ __all__ = [
     "SIMULATED",
     "axes_or_new",
     "caption",
+    "columns",
     "drawing",
     "folded",
     "heading",
     "is_narrow",
+    "legend_below",
     "legend_inside",
     "literal",
     "names_beside",
@@ -61,6 +63,7 @@ __all__ = [
     "plain_log_ticks",
     "share",
     "sheet",
+    "stack",
     "thinned",
     "trace",
     "whole",
@@ -154,10 +157,6 @@ def panels(given: Figure | SubFigure | None, size: tuple[float, float]) -> Figur
     """Return the figure to draw in: the one given, or a new one of a size in inches."""
     from matplotlib.figure import FigureBase
 
-    if (chosen := CHOSEN.get()) is not None:
-        raise ParameterError(
-            "panel", quoted(chosen.name), "plot(), as this picture has no panels drawn alone"
-        )
     if given is None:
         return _new_figure(size)
     expect("fig", given, FigureBase, "a figure of Matplotlib, or a part of one")
@@ -224,6 +223,46 @@ def sheet(
     return figure, axes
 
 
+def columns(
+    given: Figure | SubFigure | None,
+    width: float,
+    parts: Sequence[Mapping[str, float]],
+    widths: Sequence[float],
+) -> tuple[FigureBase, dict[str, Axes]]:
+    """Make panels in columns of their own heights, below each other where it is narrow.
+
+    Parameters
+    ----------
+    given : Figure or SubFigure or None
+        The figure to draw in; a new one where None.
+    width : float
+        Width of a new figure on a screen [inch].
+    parts : sequence of mappings of str to float
+        Names of the panels of each column, and their heights in a figure of this width [inch].
+    widths : sequence of float
+        Parts of the columns.
+
+    Returns
+    -------
+    figure, axes
+        As of `sheet`.
+    """
+    if (chosen := CHOSEN.get()) is not None:
+        return _alone(chosen, [[name for part in parts for name in part]])
+    if is_narrow(given, (width, width)):
+        # Each keeps its shape.
+        pairs, all_wide = zip(parts, widths, strict=True), sum(widths)
+        parts = [{k: all_wide / wide * v for part, wide in pairs for k, v in part.items()}]
+        widths = [1.0]
+    figure = panels(given, (width, max(sum(part.values()) for part in parts)))
+    grid = figure.add_gridspec(1, len(parts), width_ratios=widths)
+    axes: dict[str, Axes] = {}
+    for i, part in enumerate(parts):
+        places = grid[i].subgridspec(len(part), 1, height_ratios=list(part.values()))
+        axes |= {name: figure.add_subplot(places[k]) for k, name in enumerate(part)}
+    return figure, axes
+
+
 def _alone(chosen: Chosen, rows: Sequence[Sequence[str]]) -> tuple[FigureBase, dict[str, Axes]]:
     """Make the axes of one panel, and a figure that nobody sees for the others."""
     from matplotlib.figure import Figure
@@ -240,6 +279,20 @@ def share(ax: Axes, other: Axes, axis: str = "x") -> None:
     """Give two panels one axis, where both are in the picture."""
     if CHOSEN.get() is None:
         getattr(ax, f"share{axis}")(other)
+
+
+def stack(axes: Sequence[Axes]) -> None:
+    """Give panels below each other one axis of x, and one label of y, where all are drawn."""
+    if CHOSEN.get() is not None:
+        return
+    for ax in axes[:-1]:
+        ax.sharex(axes[-1])
+        ax.tick_params(labelbottom=False)
+        ax.set_xlabel("")
+    middle = axes[len(axes) // 2]
+    for ax in axes:
+        if ax is not middle and ax.get_ylabel() == middle.get_ylabel():
+            ax.set_ylabel("")
 
 
 def _proportion(
@@ -355,3 +408,12 @@ def legend_inside(ax: Axes, ncols: int = 4) -> None:
         high = ROOMS[ax][1]
     ROOMS[ax] = (low, high, ncols)
     place_legend(ax, min(ncols, count), ROW * -(-count // ncols) + 0.02)
+
+
+def legend_below(ax: Axes) -> None:
+    """Put a legend of long names below axes that have no label there, inside those drawn alone."""
+    if CHOSEN.get() is not None:
+        legend_inside(ax)
+        return
+    look = {"frameon": False, "fontsize": "small", "handlelength": 4.0}
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.02), **look)

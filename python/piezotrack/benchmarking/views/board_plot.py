@@ -14,8 +14,8 @@ from ..._support.display.plot_style import (
     legend_inside,
     literal,
     names_beside,
-    panels,
     plain_log_ticks,
+    sheet,
     whole,
 )
 
@@ -43,25 +43,26 @@ OTHERS: tuple[dict[str, Any], ...] = (
 @drawing
 def plot_board(board: Benchmark, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw the rms of each model on each part of each record."""
-    tables = [[row for row in board.of(name) if row.parts] for name in board.records]
-    tables = [rows for rows in tables if rows]
-    columns = min(COLUMNS, max(1, len(tables)))
-    if is_narrow(fig, (7.2 * columns, 3.4)):
-        columns = 1
-    lines = [tables[i : i + columns] for i in range(0, len(tables), columns)]
-    heights = [max(len(rows) for rows in line) + 3.2 for line in lines] or [4.0]
-    size = (7.2 * columns, max(3.4, 0.27 * sum(heights)))
+    tables = {name: [row for row in board.of(name) if row.parts] for name in board.records}
+    tables = {name: rows for name, rows in tables.items() if rows}
+    names = list(tables) or ["."]
+    across = min(COLUMNS, len(names))
+    if is_narrow(fig, (7.2 * across, 3.4)):
+        across = 1
+    names += ["."] * (-len(names) % across)
+    lines = [names[i : i + across] for i in range(0, len(names), across)]
+    heights = [max(len(tables.get(name, ())) for name in line) + 3.2 for line in lines]
+    size = (7.2 * across, max(3.4, 0.27 * sum(heights)))
     # Letters do not shrink with the width: there is more height in its place.
     scale = size[0] / look().size(*size)[0]
-    figure = panels(fig, (size[0], size[1] * max(1.0, 0.75 * scale)))
-    grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
-    for i, line in enumerate(lines):
-        for k, rows in enumerate(line):
-            _record(figure.add_subplot(grid[i, k]), rows)
+    size = size[0], size[1] * max(1.0, 0.75 * scale)
+    figure, axes = sheet(fig, size, lines, heights=heights)
+    for name, rows in tables.items():
+        _record(rows, axes[name])
     return whole(figure)
 
 
-def _record(ax: Axes, rows: list[BenchmarkResult]) -> None:
+def _record(rows: list[BenchmarkResult], ax: Axes) -> None:
     """Draw the models of a record, the best at the top."""
     styles = {part.part: style for part, style in zip(rows[0].parts, _styles(rows), strict=True)}
     places = range(len(rows))

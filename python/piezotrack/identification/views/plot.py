@@ -5,7 +5,7 @@ Every function takes the axes to draw on and returns them, so that the pictures 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,10 +21,8 @@ from ..._support.display.plot_style import (
     caption,
     drawing,
     heading,
-    is_narrow,
     legend_inside,
     literal,
-    panels,
     plain_log_ticks,
     share,
     sheet,
@@ -251,15 +249,26 @@ def plot_model(
     searched = fit is not None and fit.model.info.searched
     rows = (("loop", "time"), ("convergence" if searched else "loop", "error"))
     figure, axes = sheet(fig, (11.0, 6.6 if searched else 5.6), rows, widths=(1.0, 1.35), down=True)
-    plot_loop(record, run, axes["loop"])
+    _fitted(record, run, axes, stroke=model.stroke, half=band_of(model, record))
     if fit is not None and searched:
         plot_convergence(fit, axes["convergence"])
-    both = axes["time"], axes["error"]
-    share(both[1], both[0])
-    plot_time(record, run, both, stroke=model.stroke, half=band_of(model, record))
     title = what_was_shown(model, record, run)
     caption(figure, what_was_fitted(fit) if fit and data is None else title)
     return whole(figure)
+
+
+def _fitted(
+    record: Dataset,
+    run: Response,
+    axes: Mapping[str, Axes],
+    which: str = "",
+    **options: Any,
+) -> None:
+    """Draw loop, displacement and error of a record in the panels of these names."""
+    both = axes[f"time{which}"], axes[f"error{which}"]
+    plot_loop(record, run, axes[f"loop{which}"])
+    share(both[1], both[0])
+    plot_time(record, run, both, **options)
 
 
 @drawing
@@ -328,25 +337,23 @@ def _shown(model: IdentifiedModel, data: Dataset | None) -> tuple[Dataset, Respo
 
 def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
     """Draw loop, displacement and error of each record, and the convergence below."""
-    # Below each other three panels of a record take more than beside each other.
-    high = 21.0 if is_narrow(fig, (11.0, 4.6)) else 4.6
-    heights = [high] * len(fit.records) + ([3.0 * high / 9.0] if fit.model.info.searched else [])
-    figure = panels(fig, (11.0, sum(heights)))
-    parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-    for record, part in zip(fit.records, parts, strict=False):
-        if record.data is None:
-            continue
-        run = fit.simulate(record.data, offset=record.offset)
-        rows = (("loop", "time"), ("loop", "error"))
-        _, axes = sheet(part, (11.0, 4.6), rows, widths=(1.0, 1.35))
-        plot_loop(record.data, run, axes["loop"])
-        both = axes["time"], axes["error"]
-        share(both[1], both[0])
-        half = band_of(fit, record.data)
-        plot_time(record.data, run, both, stroke=record.stroke, half=half)
-        caption(part, what_was_fitted(fit, record))
+    shown = {f" {i}": one for i, one in enumerate(fit.records, 1) if one.data is not None}
+    rows = []
+    for which in shown:
+        rows += [(f"loop{which}", f"time{which}"), (f"loop{which}", f"error{which}")]
+    heights = [2.3] * len(rows)
     if fit.model.info.searched:
-        plot_convergence(fit, parts[-1].subplots())
+        rows.append(("convergence", "convergence"))
+        heights.append(1.6)
+    figure, axes = sheet(fig, (11.0, sum(heights)), rows, heights=heights, widths=(1.0, 1.35))
+    for which, record in shown.items():
+        assert record.data is not None
+        run = fit.simulate(record.data, offset=record.offset)
+        half = band_of(fit, record.data)
+        title = what_was_fitted(fit, record)
+        _fitted(record.data, run, axes, which, stroke=record.stroke, half=half, title=title)
+    if fit.model.info.searched:
+        plot_convergence(fit, axes["convergence"])
     return whole(figure)
 
 
