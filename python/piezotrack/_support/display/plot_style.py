@@ -15,7 +15,7 @@ from ..arguments import expect, has_entries
 from ..messages import quoted
 from .fitting import ROOMS, place_legend, whole
 from .look import CHOSEN, drawing, look
-from .thinning import extremes
+from .thinning import extremes, path_cells
 from .wrapping import folded
 
 if TYPE_CHECKING:
@@ -60,6 +60,7 @@ __all__ = [
     "literal",
     "names_beside",
     "panels",
+    "path",
     "plain_log_ticks",
     "share",
     "sheet",
@@ -133,6 +134,8 @@ MODELS: tuple[dict[str, Any], ...] = tuple(
 )
 # More points than columns of pixels, yet few enough for a small SVG.
 MOST_POINTS = 6000
+# Cells of a path across the axes, and ways between them from which it is a cloud.
+CELLS, CLOUD = 400, 2000
 # Height of a row of a legend, as a part of the axes.
 ROW = 0.085
 # Width [inch] below which panels are not beside each other.
@@ -357,6 +360,13 @@ def trace(
         ax.axhline(0.0, **GUIDE)
     ax.set(xlabel=xlabel or ax.get_xlabel(), ylabel=ylabel or ax.get_ylabel())
     ax.margins(x=0.0)
+
+
+def path(ax: Axes, x: Array, y: Array, style: Mapping[str, Any]) -> None:
+    """Draw a path in the plane, each way once; one of dense noise in thin pale lines."""
+    kept = path_cells(x, y, CELLS, CELLS)
+    thin = {"linewidth": 0.7, "alpha": 0.5} if kept.size > CLOUD else {}
+    ax.plot(*(np.where(kept < 0, np.nan, one[kept]) for one in (x, y)), **{**style, **thin})
 
 
 def plain_log_ticks(ax: Axes, axis: str = "y") -> None:
