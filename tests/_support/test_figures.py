@@ -203,4 +203,7 @@ def test_every_panel_is_drawn_alone_in_axes_of_ones_own(name: str) -> None:
         assert drawn(name).plot_panel(panel, ax=ax, style="paper") is ax
         assert ax.has_data()
         assert faults(figure) == [], panel
+        assert ax.get_xlabel(), panel
+        for axis in (ax.xaxis, ax.yaxis):
+            assert any(tick.label1.get_visible() for tick in axis.get_major_ticks()), panel
     assert plt.get_fignums() == []

@@ -19,7 +19,7 @@ from .thinning import extremes, path_cells
 from .wrapping import folded
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, FigureBase, SubFigure
@@ -54,7 +54,9 @@ __all__ = [
     "drawing",
     "folded",
     "heading",
+    "in_rows",
     "is_narrow",
+    "leftmost",
     "legend_below",
     "legend_inside",
     "literal",
@@ -284,18 +286,40 @@ def share(ax: Axes, other: Axes, axis: str = "x") -> None:
         getattr(ax, f"share{axis}")(other)
 
 
-def stack(axes: Sequence[Axes]) -> None:
-    """Give panels below each other one axis of x, and one label of y, where all are drawn."""
+def stack(axes: Sequence[Axes], *, numbers: bool = False) -> None:
+    """Give panels below each other one axis of x, and one label of y, where all are drawn.
+
+    The lowest is labelled and numbered; with `numbers` the others have numbers too.
+    """
     if CHOSEN.get() is not None:
         return
     for ax in axes[:-1]:
         ax.sharex(axes[-1])
-        ax.tick_params(labelbottom=False)
+        ax.tick_params(labelbottom=numbers)
         ax.set_xlabel("")
     middle = axes[len(axes) // 2]
     for ax in axes:
         if ax is not middle and ax.get_ylabel() == middle.get_ylabel():
             ax.set_ylabel("")
+
+
+def leftmost(axes: Iterable[Axes], *, numbers: bool = False) -> None:
+    """Leave what is written beside panels to those at the left, where all are drawn.
+
+    With `numbers` the others have numbers, or names of their rows, too.
+    """
+    for ax in axes:
+        place = ax.get_subplotspec()
+        if CHOSEN.get() is None and place is not None and not place.is_first_col():
+            ax.tick_params(labelleft=numbers)
+            ax.set_ylabel("")
+
+
+def in_rows(names: Iterable[str], across: int) -> list[list[str]]:
+    """Put panels in rows of so many, as for `sheet`."""
+    each = list(names) or ["."]
+    each += ["."] * (-len(each) % across)
+    return [each[i : i + across] for i in range(0, len(each), across)]
 
 
 def _proportion(

@@ -10,6 +10,7 @@ from ..._support.display.look import look
 from ..._support.display.plot_style import (
     LEVEL,
     drawing,
+    in_rows,
     is_narrow,
     legend_inside,
     literal,
@@ -45,12 +46,10 @@ def plot_board(board: Benchmark, fig: Figure | SubFigure | None = None) -> Figur
     """Draw the rms of each model on each part of each record."""
     tables = {name: [row for row in board.of(name) if row.parts] for name in board.records}
     tables = {name: rows for name, rows in tables.items() if rows}
-    names = list(tables) or ["."]
-    across = min(COLUMNS, len(names))
+    across = min(COLUMNS, max(1, len(tables)))
     if is_narrow(fig, (7.2 * across, 3.4)):
         across = 1
-    names += ["."] * (-len(names) % across)
-    lines = [names[i : i + across] for i in range(0, len(names), across)]
+    lines = in_rows(tables, across)
     heights = [max(len(tables.get(name, ())) for name in line) + 3.2 for line in lines]
     size = (7.2 * across, max(3.4, 0.27 * sum(heights)))
     # Letters do not shrink with the width: there is more height in its place.

@@ -11,7 +11,7 @@ from ..._support.display.plot_style import (
     GREY,
     drawing,
     heading,
-    is_narrow,
+    leftmost,
     legend_inside,
     names_beside,
     plain_log_ticks,
@@ -52,8 +52,7 @@ def plot_controllers(
     _references(comparison, axes["references"])
     _stages(comparison, axes["stages"])
     share(axes["stages"], axes["references"], "y")
-    if not is_narrow(fig, size):
-        axes["stages"].tick_params(labelleft=False)
+    leftmost(axes.values())
     return whole(drawn)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..._support.arguments import expect, finite, positive
+from ..._support.display.look import CHOSEN
 from ..._support.display.plot_style import (
     BAND,
     ERROR,
@@ -128,8 +129,9 @@ def plot_time(
     if data.left_out is not None:
         error[data.left_out] = np.nan
     small, fine = best_length_unit(float(np.abs(data.counted(error)).max()))
+    words = "time [s]" if CHOSEN.get() else ""
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
-        trace(above, data.t, scale * y, style, ylabel=f"displacement [{unit}]")
+        trace(above, data.t, scale * y, style, xlabel=words, ylabel=f"displacement [{unit}]")
     heading(above, title)
     if fitted_until is not None:
         mark = {**QUIET, "label": "fitted before, predicted after"}
