@@ -195,13 +195,17 @@ def test_every_panel_is_drawn_alone_in_axes_of_ones_own(name: str) -> None:
         drawn(name).plot_panel("none")
     panels = str(refused.value).partition("one of ")[2].split(", ")
     whole = drawn_figure(drawn(name).plot)
-    assert len(panels) == sum(ax.has_data() for ax in whole.axes)
+    drawn_axes = [ax for ax in whole.axes if ax.has_data()]
+    assert len(panels) == len(drawn_axes)
     plt.close("all")
-    for panel in panels:
+    for panel, part in zip(panels, drawn_axes, strict=True):
         figure = Figure(figsize=(3.3, 2.5), layout="constrained")
         ax = figure.subplots()
         assert drawn(name).plot_panel(panel, ax=ax, style="paper") is ax
+        # All that is in the picture.
         assert ax.has_data()
+        assert len(ax.lines) == len(part.lines), panel
+        assert len(ax.collections) == len(part.collections), panel
         assert faults(figure) == [], panel
         assert ax.get_xlabel(), panel
         for axis in (ax.xaxis, ax.yaxis):
