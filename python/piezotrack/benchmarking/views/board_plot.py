@@ -19,6 +19,7 @@ from ..._support.display.plot_style import (
     sheet,
     whole,
 )
+from .board_table import title_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,7 +77,7 @@ def _record(rows: list[BenchmarkResult], ax: Axes) -> None:
         ax.axvline(noise, **LEVEL, label="noise")
     ax.set_xscale("log")
     plain_log_ticks(ax, "x")
-    names_beside(ax, places, [_name(row) for row in rows])
+    names_beside(ax, places, [title_of(row) for row in rows])
     ax.tick_params(axis="y", labelsize="small")
     ax.set_ylim(len(rows) - 0.4, -0.6)
     ax.set_xlabel("rms error [% of stroke fitted]", fontsize="small")
@@ -97,7 +98,3 @@ def _styles(rows: list[BenchmarkResult]) -> list[dict[str, Any]]:
         else:
             styles.append(next(others))
     return styles
-
-
-def _name(row: BenchmarkResult) -> str:
-    return f"{row.title}: {row.chosen}" if row.chosen else row.title

@@ -59,6 +59,7 @@ __all__ = [
     "plot_model",
     "plot_model_loop",
     "plot_model_time",
+    "plot_record",
     "plot_response",
     "plot_time",
     "what_was_fitted",
@@ -251,7 +252,7 @@ def plot_model(
     searched = fit is not None and fit.model.info.searched
     rows = (("loop", "time"), ("convergence" if searched else "loop", "error"))
     figure, axes = sheet(fig, (11.0, 6.6 if searched else 5.6), rows, widths=(1.0, 1.35), down=True)
-    _fitted(record, run, axes, stroke=model.stroke, half=band_of(model, record))
+    plot_record(record, run, axes, stroke=model.stroke, half=band_of(model, record))
     if fit is not None and searched:
         plot_convergence(fit, axes["convergence"])
     title = what_was_shown(model, record, run)
@@ -259,14 +260,10 @@ def plot_model(
     return whole(figure)
 
 
-def _fitted(
-    record: Dataset,
-    run: Response,
-    axes: Mapping[str, Axes],
-    which: str = "",
-    **options: Any,
+def plot_record(
+    record: Dataset, run: Response, axes: Mapping[str, Axes], which: str = "", **options: Any
 ) -> None:
-    """Draw loop, displacement and error of a record in the panels of these names."""
+    """Draw loop, displacement and error of a record in the panels of these names, and an end."""
     both = axes[f"time{which}"], axes[f"error{which}"]
     plot_loop(record, run, axes[f"loop{which}"])
     share(both[1], both[0])
@@ -353,7 +350,7 @@ def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
         run = fit.simulate(record.data, offset=record.offset)
         half = band_of(fit, record.data)
         title = what_was_fitted(fit, record)
-        _fitted(record.data, run, axes, which, stroke=record.stroke, half=half, title=title)
+        plot_record(record.data, run, axes, which, stroke=record.stroke, half=half, title=title)
     if fit.model.info.searched:
         plot_convergence(fit, axes["convergence"])
     return whole(figure)
