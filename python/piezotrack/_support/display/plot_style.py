@@ -234,23 +234,10 @@ def columns(
     parts: Sequence[Mapping[str, float]],
     widths: Sequence[float],
 ) -> tuple[FigureBase, dict[str, Axes]]:
-    """Make panels in columns of their own heights, below each other where it is narrow.
+    """Make panels in columns of heights of their own, below each other where it is narrow.
 
-    Parameters
-    ----------
-    given : Figure or SubFigure or None
-        The figure to draw in; a new one where None.
-    width : float
-        Width of a new figure on a screen [inch].
-    parts : sequence of mappings of str to float
-        Names of the panels of each column, and their heights in a figure of this width [inch].
-    widths : sequence of float
-        Parts of the columns.
-
-    Returns
-    -------
-    figure, axes
-        As of `sheet`.
+    `parts` has the panels of each column with their heights [inch] in a figure of `width` [inch]
+    on a screen, `widths` the parts of the columns.
     """
     if (chosen := CHOSEN.get()) is not None:
         return _alone(chosen, [[name for part in parts for name in part]])

@@ -54,13 +54,7 @@ DAHL = Diagram(
     blocks=(
         Block(2.2, 4.0, 1.2, "$T$"),
         Block(7.0, 4.0, 3.6, "$1 / (M s^2 + D s + K)$"),
-        Block(
-            7.0,
-            1.5,
-            4.6,
-            r"$\dot V = A_h V \dot x + B_h u_p \dot x$,"
-            "\n$F_h = C_h V$",
-        ),
+        Block(7.0, 1.5, 4.6, "$\\dot V = A_h V \\dot x + B_h u_p \\dot x$,\n$F_h = C_h V$"),
     ),
     sums=((4.0, 4.0),),
     paths=(

@@ -163,20 +163,18 @@ def _convergence(fit: Identification) -> Figure:
 def _drives(drives: Drives) -> Figure:
     """Draw the drives over the reference and, less the line, over time."""
     figure, axes = sheet(None, (11.0, 4.6), (("reference", "time"),))
-    left, right = axes.values()
     # Two periods of 1 Hz.
     part = drives.t < drives.t[0] + 2.0
-    t, um = drives.t[part], 1e6 * (drives.desired - drives.desired.mean())[part]
-    left.plot(um, (drives.measured - drives.line)[part], **MEASURED)
-    right.plot(t, (drives.measured - drives.line)[part], **MEASURED)
-    for (name, voltage), line in zip(drives.computed.items(), MODELS, strict=False):
-        added = (voltage - drives.line)[part]
-        left.plot(um, added, linewidth=1.1, label=name, **line)
-        right.plot(t, added, linewidth=1.1, label=name, **line)
-    left.set(xlabel="reference [um]", ylabel="drive - straight line [V]")
-    right.set(xlabel="time [s]", ylabel="drive - straight line [V]")
-    right.margins(x=0.0)
-    legend_inside(right, ncols=2)
+    um = 1e6 * (drives.desired - drives.desired.mean())
+    for name, over, words in (("reference", um, "[um]"), ("time", drives.t, "[s]")):
+        ax = axes[name]
+        ax.plot(over[part], (drives.measured - drives.line)[part], **MEASURED)
+        for (drive, voltage), line in zip(drives.computed.items(), MODELS, strict=False):
+            added = (voltage - drives.line)[part]
+            ax.plot(over[part], added, linewidth=1.1, label=drive, **line)
+        ax.set(xlabel=f"{name} {words}", ylabel="drive - straight line [V]")
+    axes["time"].margins(x=0.0)
+    legend_inside(axes["time"], ncols=2)
     return whole(figure)
 
 
