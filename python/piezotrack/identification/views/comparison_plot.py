@@ -47,8 +47,8 @@ def plot_comparison(comparison: Comparison, fig: Figure | SubFigure | None = Non
     """Put loops, errors and bars on one sheet."""
     rows = comparison.rows
     # The names have a place of their own below the loop.
-    left = {"loop": 2.8 + 0.1 * len(rows), "loop error": 1.9, "rms": 1.2 + 0.4 * len(rows)}
-    right = {f"error of {row.name}": 1.2 for row in rows}
+    left = {"loop": 2.6, "loop error": 1.9, "rms": 1.2 + 0.4 * len(rows)}
+    right = {f"error of {row.name}": 1.1 for row in rows}
     figure, axes = columns(fig, 11.0, (left, right), (1.0, 1.35))
     followed = [comparison.followed(row, "test") for row in rows]
     cycle = _cycle(comparison.test, followed)
