@@ -374,10 +374,12 @@ def trace(
 
 
 def path(ax: Axes, x: Array, y: Array, style: Mapping[str, Any]) -> None:
-    """Draw a path in the plane, each way once; one of dense noise in thin pale lines."""
-    kept = path_cells(x, y, CELLS, CELLS)
-    thin = {"linewidth": 0.7, "alpha": 0.5} if kept.size > CLOUD else {}
-    ax.plot(*(np.where(kept < 0, np.nan, one[kept]) for one in (x, y)), **{**style, **thin})
+    """Draw a path in the plane, a long one each way once; dense noise in thin pale lines."""
+    if x.size > CLOUD:
+        kept = path_cells(x, y, CELLS, CELLS)
+        x, y = (np.where(kept < 0, np.nan, one[kept]) for one in (x, y))
+    thin = {"linewidth": 0.7, "alpha": 0.5} if x.size > CLOUD else {}
+    ax.plot(x, y, **{**style, **thin})
 
 
 def plain_log_ticks(ax: Axes, axis: str = "y") -> None:

@@ -149,7 +149,8 @@ def _error(comparison: Comparison, row: ModelScore, color: str, ax: Axes) -> Non
         (first.t, first.y - comparison.followed(row, "train")),
         (second.t + gap, second.y - comparison.followed(row, "test")),
     ):
-        trace(ax, t, scale * error, {"color": color, "linewidth": 0.7}, zero=True)
+        trace(ax, t, scale * error, {"color": color, "linewidth": 0.7})
+    ax.axhline(0.0, **GUIDE)
     ax.axvline(split, **QUIET)
     ax.set_title(_heading(row), fontsize="small", loc="left")
     how = "" if comparison.carried else ", the other record after the first"
