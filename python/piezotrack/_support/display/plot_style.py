@@ -304,7 +304,7 @@ def leftmost(axes: Iterable[Axes], *, numbers: bool = False) -> None:
 
 def in_rows(names: Iterable[str], across: int) -> list[list[str]]:
     """Put panels in rows of so many, as for `sheet`."""
-    each = list(names) or ["."]
+    each = list(names)
     each += ["."] * (-len(each) % across)
     return [each[i : i + across] for i in range(0, len(each), across)]
 

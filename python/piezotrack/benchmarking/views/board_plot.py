@@ -50,13 +50,16 @@ def plot_board(board: Benchmark, fig: Figure | SubFigure | None = None) -> Figur
     across = min(COLUMNS, max(1, len(tables)))
     if is_narrow(fig, (7.2 * across, 3.4)):
         across = 1
-    lines = in_rows(tables, across)
+    lines = in_rows(tables or ["none"], across)
     heights = [max(len(tables.get(name, ())) for name in line) + 3.2 for line in lines]
     size = (7.2 * across, max(3.4, 0.27 * sum(heights)))
     # Letters do not shrink with the width: there is more height in its place.
     scale = size[0] / look().size(*size)[0]
     size = size[0], size[1] * max(1.0, 0.75 * scale)
     figure, axes = sheet(fig, size, lines, heights=heights)
+    if not tables:
+        axes["none"].text(0.5, 0.5, "no model was found", ha="center")
+        axes["none"].set_axis_off()
     for name, rows in tables.items():
         _record(rows, axes[name])
     return whole(figure)
