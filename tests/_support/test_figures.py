@@ -65,6 +65,11 @@ CASES = [
 ]
 
 
+PANELLED = [
+    pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in OBJECTS
+]
+
+
 @pytest.fixture(autouse=True)
 def _no_figure_is_left() -> Iterator[None]:
     yield
@@ -184,20 +189,25 @@ def test_nothing_overlaps(name: str, method: str, width: str) -> None:
     assert not figure.get_suptitle()
 
 
-# One picture as a whole, or one of several records.
-WHOLE = ("Benchmark", "Comparison", "Identification, several", "Reproduction")
-
-
-@pytest.mark.parametrize("name", [name for name in OBJECTS if name not in SLOW])
+@pytest.mark.parametrize("name", PANELLED)
 def test_every_panel_is_drawn_alone_in_axes_of_ones_own(name: str) -> None:
     with pytest.raises(pt.ParameterError, match="panel is 'none'") as refused:
         drawn(name).plot_panel("none")
-    _, _, names = str(refused.value).partition("one of ")
-    assert bool(names) == (name not in WHOLE)
-    for panel in filter(None, names.split(", ")):
+    panels = str(refused.value).partition("one of ")[2].split(", ")
+    whole = drawn_figure(drawn(name).plot)
+    drawn_axes = [ax for ax in whole.axes if ax.has_data()]
+    assert len(panels) == len(drawn_axes)
+    plt.close("all")
+    for panel, part in zip(panels, drawn_axes, strict=True):
         figure = Figure(figsize=(3.3, 2.5), layout="constrained")
         ax = figure.subplots()
         assert drawn(name).plot_panel(panel, ax=ax, style="paper") is ax
+        # All that is in the picture.
         assert ax.has_data()
+        assert len(ax.lines) == len(part.lines), panel
+        assert len(ax.collections) == len(part.collections), panel
         assert faults(figure) == [], panel
+        assert ax.get_xlabel(), panel
+        for axis in (ax.xaxis, ax.yaxis):
+            assert any(tick.label1.get_visible() for tick in axis.get_major_ticks()), panel
     assert plt.get_fignums() == []

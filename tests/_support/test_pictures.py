@@ -242,7 +242,8 @@ def test_sixteen_models_have_lines_of_their_own() -> None:
 
 def test_names_of_many_models_leave_the_loop_its_panel() -> None:
     few = PICTURES["comparison"]()
-    many = replace(few, rows=tuple((list(few.rows) * 16)[:16]))
+    rows = (list(few.rows) * 16)[:16]
+    many = replace(few, rows=tuple(replace(row, name=f"{i}") for i, row in enumerate(rows)))
     figure = many.plot()
     figure.canvas.draw()
     loop, errors = figure.axes[0], figure.axes[-1]
@@ -254,6 +255,23 @@ def test_names_of_many_models_leave_the_loop_its_panel() -> None:
     box = names.get_window_extent(figure.canvas.get_renderer())
     assert box.x0 >= 0.0
     assert box.x1 <= errors.get_window_extent().x0
+
+
+def test_a_path_of_dense_noise_is_pale_and_keeps_its_ends() -> None:
+    x = np.tile(np.linspace(0.0, 1.0, 2000), 20)
+    noise = 0.05 * np.random.default_rng(1).standard_normal(x.size)
+    ax = Figure().subplots()
+    plot_style.path(ax, x, x, plot_style.ACTUAL)
+    plot_style.path(ax, x, x + noise, plot_style.ACTUAL)
+    plain, dense = ax.lines
+    assert np.asarray(plain.get_xdata()).size < 1000
+    assert plain.get_alpha() is None
+    assert dense.get_alpha() is not None
+    assert dense.get_linewidth() < 0.5 * plain.get_linewidth()
+    # As far as a cell of the grid, extremes stay.
+    y = np.asarray(dense.get_ydata())
+    assert np.nanmax(y) > np.max(x + noise) - 0.01
+    assert np.nanmin(y) < np.min(x + noise) + 0.01
 
 
 def _names(ax: Axes) -> list[str]:

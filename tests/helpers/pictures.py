@@ -16,6 +16,7 @@ from piezotrack.control.on_device.closed_loop import DeviceTracking
 from piezotrack.control.on_device.latency import latency_of
 from piezotrack.control.views.tracking_plot import plot_feedforward
 from piezotrack.identification.views.plot import plot_response
+from piezotrack.xu_li_2010.views.block_diagrams import plot_block_diagrams
 from watched_records import model_watched, watched
 
 if TYPE_CHECKING:
@@ -242,4 +243,5 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "plot_response": response,
     "plot_feedforward": feedforward,
     "plot_before_and_after": before_and_after,
+    "plot_block_diagrams": plot_block_diagrams,
 }

@@ -242,7 +242,7 @@ def test_an_exact_fit_can_be_told_and_drawn() -> None:
 
 def test_the_picture_has_loops_bars_and_an_error_for_each() -> None:
     figure = comparison_of_pair().plot()
-    loops, off, _names, bars, *errors = figure.axes
+    loops, off, bars, *errors = figure.axes
     assert off.get_xlabel() == "drive [V]"
     assert loops.get_ylabel() == "displacement [\N{MICRO SIGN}m]"
     labels = [line.get_label() for line in loops.lines]

@@ -15,11 +15,11 @@ from ..arguments import expect, has_entries
 from ..messages import quoted
 from .fitting import ROOMS, place_legend, whole
 from .look import CHOSEN, drawing, look
-from .thinning import extremes
+from .thinning import extremes, path_cells
 from .wrapping import folded
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, FigureBase, SubFigure
@@ -50,17 +50,23 @@ __all__ = [
     "SIMULATED",
     "axes_or_new",
     "caption",
+    "columns",
     "drawing",
     "folded",
     "heading",
+    "in_rows",
     "is_narrow",
+    "leftmost",
+    "legend_below",
     "legend_inside",
     "literal",
     "names_beside",
     "panels",
+    "path",
     "plain_log_ticks",
     "share",
     "sheet",
+    "stack",
     "thinned",
     "trace",
     "whole",
@@ -130,6 +136,8 @@ MODELS: tuple[dict[str, Any], ...] = tuple(
 )
 # More points than columns of pixels, yet few enough for a small SVG.
 MOST_POINTS = 6000
+# Cells of a path across the axes, and ways between them from which it is a cloud.
+CELLS, CLOUD = 400, 2000
 # Height of a row of a legend, as a part of the axes.
 ROW = 0.085
 # Width [inch] below which panels are not beside each other.
@@ -154,10 +162,6 @@ def panels(given: Figure | SubFigure | None, size: tuple[float, float]) -> Figur
     """Return the figure to draw in: the one given, or a new one of a size in inches."""
     from matplotlib.figure import FigureBase
 
-    if (chosen := CHOSEN.get()) is not None:
-        raise ParameterError(
-            "panel", quoted(chosen.name), "plot(), as this picture has no panels drawn alone"
-        )
     if given is None:
         return _new_figure(size)
     expect("fig", given, FigureBase, "a figure of Matplotlib, or a part of one")
@@ -224,6 +228,33 @@ def sheet(
     return figure, axes
 
 
+def columns(
+    given: Figure | SubFigure | None,
+    width: float,
+    parts: Sequence[Mapping[str, float]],
+    widths: Sequence[float],
+) -> tuple[FigureBase, dict[str, Axes]]:
+    """Make panels in columns of heights of their own, below each other where it is narrow.
+
+    `parts` has the panels of each column with their heights [inch] in a figure of `width` [inch]
+    on a screen, `widths` the parts of the columns.
+    """
+    if (chosen := CHOSEN.get()) is not None:
+        return _alone(chosen, [[name for part in parts for name in part]])
+    if is_narrow(given, (width, width)):
+        # Each keeps its shape.
+        pairs, all_wide = zip(parts, widths, strict=True), sum(widths)
+        parts = [{k: all_wide / wide * v for part, wide in pairs for k, v in part.items()}]
+        widths = [1.0]
+    figure = panels(given, (width, max(sum(part.values()) for part in parts)))
+    grid = figure.add_gridspec(1, len(parts), width_ratios=widths)
+    axes: dict[str, Axes] = {}
+    for i, part in enumerate(parts):
+        places = grid[i].subgridspec(len(part), 1, height_ratios=list(part.values()))
+        axes |= {name: figure.add_subplot(places[k]) for k, name in enumerate(part)}
+    return figure, axes
+
+
 def _alone(chosen: Chosen, rows: Sequence[Sequence[str]]) -> tuple[FigureBase, dict[str, Axes]]:
     """Make the axes of one panel, and a figure that nobody sees for the others."""
     from matplotlib.figure import Figure
@@ -240,6 +271,42 @@ def share(ax: Axes, other: Axes, axis: str = "x") -> None:
     """Give two panels one axis, where both are in the picture."""
     if CHOSEN.get() is None:
         getattr(ax, f"share{axis}")(other)
+
+
+def stack(axes: Sequence[Axes], *, numbers: bool = False) -> None:
+    """Give panels below each other one axis of x, and one label of y, where all are drawn.
+
+    The lowest is labelled and numbered; with `numbers` the others have numbers too.
+    """
+    if CHOSEN.get() is not None:
+        return
+    for ax in axes[:-1]:
+        ax.sharex(axes[-1])
+        ax.tick_params(labelbottom=numbers)
+        ax.set_xlabel("")
+    middle = axes[len(axes) // 2]
+    for ax in axes:
+        if ax is not middle and ax.get_ylabel() == middle.get_ylabel():
+            ax.set_ylabel("")
+
+
+def leftmost(axes: Iterable[Axes], *, numbers: bool = False) -> None:
+    """Leave what is written beside panels to those at the left, where all are drawn.
+
+    With `numbers` the others have numbers, or names of their rows, too.
+    """
+    for ax in axes:
+        place = ax.get_subplotspec()
+        if CHOSEN.get() is None and place is not None and not place.is_first_col():
+            ax.tick_params(labelleft=numbers)
+            ax.set_ylabel("")
+
+
+def in_rows(names: Iterable[str], across: int) -> list[list[str]]:
+    """Put panels in rows of so many, as for `sheet`."""
+    each = list(names)
+    each += ["."] * (-len(each) % across)
+    return [each[i : i + across] for i in range(0, len(each), across)]
 
 
 def _proportion(
@@ -306,6 +373,15 @@ def trace(
     ax.margins(x=0.0)
 
 
+def path(ax: Axes, x: Array, y: Array, style: Mapping[str, Any]) -> None:
+    """Draw a path in the plane, a long one each way once; dense noise in thin pale lines."""
+    if x.size > CLOUD:
+        kept = path_cells(x, y, CELLS, CELLS)
+        x, y = (np.where(kept < 0, np.nan, one[kept]) for one in (x, y))
+    thin = {"linewidth": 0.7, "alpha": 0.5} if x.size > CLOUD else {}
+    ax.plot(x, y, **{**style, **thin})
+
+
 def plain_log_ticks(ax: Axes, axis: str = "y") -> None:
     """Label a short logarithmic axis with plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -355,3 +431,12 @@ def legend_inside(ax: Axes, ncols: int = 4) -> None:
         high = ROOMS[ax][1]
     ROOMS[ax] = (low, high, ncols)
     place_legend(ax, min(ncols, count), ROW * -(-count // ncols) + 0.02)
+
+
+def legend_below(ax: Axes) -> None:
+    """Put a legend of long names below axes that have no label there, inside those drawn alone."""
+    if CHOSEN.get() is not None:
+        legend_inside(ax)
+        return
+    look = {"frameon": False, "fontsize": "small", "handlelength": 4.0}
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.02), **look)

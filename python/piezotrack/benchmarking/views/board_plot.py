@@ -10,14 +10,16 @@ from ..._support.display.look import look
 from ..._support.display.plot_style import (
     LEVEL,
     drawing,
+    in_rows,
     is_narrow,
     legend_inside,
     literal,
     names_beside,
-    panels,
     plain_log_ticks,
+    sheet,
     whole,
 )
+from .board_table import title_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,25 +45,27 @@ OTHERS: tuple[dict[str, Any], ...] = (
 @drawing
 def plot_board(board: Benchmark, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw the rms of each model on each part of each record."""
-    tables = [[row for row in board.of(name) if row.parts] for name in board.records]
-    tables = [rows for rows in tables if rows]
-    columns = min(COLUMNS, max(1, len(tables)))
-    if is_narrow(fig, (7.2 * columns, 3.4)):
-        columns = 1
-    lines = [tables[i : i + columns] for i in range(0, len(tables), columns)]
-    heights = [max(len(rows) for rows in line) + 3.2 for line in lines] or [4.0]
-    size = (7.2 * columns, max(3.4, 0.27 * sum(heights)))
+    tables = {name: [row for row in board.of(name) if row.parts] for name in board.records}
+    tables = {name: rows for name, rows in tables.items() if rows}
+    across = min(COLUMNS, max(1, len(tables)))
+    if is_narrow(fig, (7.2 * across, 3.4)):
+        across = 1
+    lines = in_rows(tables or ["none"], across)
+    heights = [max(len(tables.get(name, ())) for name in line) + 3.2 for line in lines]
+    size = (7.2 * across, max(3.4, 0.27 * sum(heights)))
     # Letters do not shrink with the width: there is more height in its place.
     scale = size[0] / look().size(*size)[0]
-    figure = panels(fig, (size[0], size[1] * max(1.0, 0.75 * scale)))
-    grid = figure.add_gridspec(len(heights), columns, height_ratios=heights)
-    for i, line in enumerate(lines):
-        for k, rows in enumerate(line):
-            _record(figure.add_subplot(grid[i, k]), rows)
+    size = size[0], size[1] * max(1.0, 0.75 * scale)
+    figure, axes = sheet(fig, size, lines, heights=heights)
+    if not tables:
+        axes["none"].text(0.5, 0.5, "no model was found", ha="center")
+        axes["none"].set_axis_off()
+    for name, rows in tables.items():
+        _record(rows, axes[name])
     return whole(figure)
 
 
-def _record(ax: Axes, rows: list[BenchmarkResult]) -> None:
+def _record(rows: list[BenchmarkResult], ax: Axes) -> None:
     """Draw the models of a record, the best at the top."""
     styles = {part.part: style for part, style in zip(rows[0].parts, _styles(rows), strict=True)}
     places = range(len(rows))
@@ -76,7 +80,7 @@ def _record(ax: Axes, rows: list[BenchmarkResult]) -> None:
         ax.axvline(noise, **LEVEL, label="noise")
     ax.set_xscale("log")
     plain_log_ticks(ax, "x")
-    names_beside(ax, places, [_name(row) for row in rows])
+    names_beside(ax, places, [title_of(row) for row in rows])
     ax.tick_params(axis="y", labelsize="small")
     ax.set_ylim(len(rows) - 0.4, -0.6)
     ax.set_xlabel("rms error [% of stroke fitted]", fontsize="small")
@@ -97,7 +101,3 @@ def _styles(rows: list[BenchmarkResult]) -> list[dict[str, Any]]:
         else:
             styles.append(next(others))
     return styles
-
-
-def _name(row: BenchmarkResult) -> str:
-    return f"{row.title}: {row.chosen}" if row.chosen else row.title

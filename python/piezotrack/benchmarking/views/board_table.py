@@ -11,7 +11,7 @@ from ..._support.display.table import Column, Table
 if TYPE_CHECKING:
     from ..board import Benchmark, BenchmarkResult, PartScore
 
-__all__ = ["board_markdown", "board_text"]
+__all__ = ["board_markdown", "board_text", "title_of"]
 
 NOTES = """\
 default: the model chosen by pt.identify(log). Errors are rms in per cent of the stroke fitted; um:
@@ -41,7 +41,7 @@ def board_text(board: Benchmark) -> str:
         lines += [_about(rows), *_table(rows).lines()]
         for row in rows:
             if row.error:
-                said = f"no fit: {_title(row)}: {row.error}"
+                said = f"no fit: {title_of(row)}: {row.error}"
                 lines += wrap(said, WIDTH, initial_indent="  ", subsequent_indent="    ")
         lines.append("")
     return "\n".join([*lines, NOTES])
@@ -64,7 +64,7 @@ def board_markdown(board: Benchmark) -> str:
     for name in board.records:
         rows = board.of(name)
         lines += [f"**{_about(rows)}**", "", _table(rows).markdown()]
-        failed = [f"No fit: {_title(row)}: {row.error}." for row in rows if not row.parts]
+        failed = [f"No fit: {title_of(row)}: {row.error}." for row in rows if not row.parts]
         lines += ["", *failed, *([""] if failed else [])]
     return "\n".join([*lines, NOTES])
 
@@ -79,7 +79,7 @@ def _table(rows: list[BenchmarkResult]) -> Table:
     """Make the table of the models that have a fit."""
     parts = next((row.parts for row in rows if row.parts), ())
     columns = [
-        Column("model", width=max(len(_title(row)) for row in rows), left=True),
+        Column("model", width=max(len(title_of(row)) for row in rows), left=True),
         *(Column(part.part, format=".3g") for part in parts),
         Column("K"),
         Column("s"),
@@ -92,7 +92,7 @@ def _table(rows: list[BenchmarkResult]) -> Table:
 def _cells(row: BenchmarkResult, judged: PartScore) -> list[object]:
     inverse = row.inverse
     return [
-        _title(row),
+        title_of(row),
         *(part.rms_percent for part in row.parts),
         row.values,
         f"{row.seconds:.2g}" if row.seconds < 10.0 else f"{row.seconds:.0f}",
@@ -101,7 +101,8 @@ def _cells(row: BenchmarkResult, judged: PartScore) -> list[object]:
     ]
 
 
-def _title(row: BenchmarkResult) -> str:
+def title_of(row: BenchmarkResult) -> str:
+    """Name a model, and the one that it chose."""
     return f"{row.title}: {row.chosen}" if row.chosen else row.title
 
 

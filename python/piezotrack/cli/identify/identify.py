@@ -223,22 +223,12 @@ def _search(records: list[Record], out: Path, kind: str, **arguments: Any) -> Id
 def _write(fit: Identification, second: Dataset | None, place: Path) -> list[Path]:
     """Write the model and the pictures, those of a test too."""
     from ..._support.files.writing import result_set, save_figures
-    from ...identification.views.files import save_identification
-    from ...identification.views.plot import band_of, plot_loop, plot_time, what_was_shown
+    from ...identification.views.files import save_identification, shown_figures
 
     name = fit.model.info.name
-    figures = {}
-    if second is not None:
-        run = fit.simulate(second)
-        title = what_was_shown(fit, second, run)
-        axes = (
-            plot_loop(second, run, title=title),
-            plot_time(second, run, stroke=fit.stroke, half=band_of(fit, second), title=title)[0],
-        )
-        figures = {
-            f"{name}_test_{panel}": one.figure for panel, one in zip(PANELS, axes, strict=True)
-        }
+    tested = {} if second is None else shown_figures(fit, second)
+    figures = {f"{name}_test_{panel}": one for panel, one in tested.items()}
     with result_set(place) as folder:
         written = save_identification(fit, folder)
-        written += save_figures(figures, folder)  # type: ignore[arg-type]
+        written += save_figures(figures, folder)
     return written

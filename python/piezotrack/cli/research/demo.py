@@ -44,8 +44,11 @@ def _measured(output: Output, seed: int) -> None:
     """Run the demonstration on the two measured logs of the package."""
     from ..._support.files.writing import picture_files, result_set, save_figures
     from ...data.log_file import write_log
-    from ...identification.views.files import identification_files, save_identification
-    from ...identification.views.plot import band_of, plot_loop, plot_time, what_was_shown
+    from ...identification.views.files import (
+        identification_files,
+        save_identification,
+        shown_figures,
+    )
     from .demonstration import run_demo
     from .loop_plot import plot_before_and_after
 
@@ -54,13 +57,7 @@ def _measured(output: Output, seed: int) -> None:
     output.will_write(["log.csv", "other.csv", *model, *picture_files(*PICTURES)])
     demo = run_demo(seed, progress=output.progress)
     fit, other = demo.fit, demo.other
-    run = fit.simulate(other)
-    title = what_was_shown(fit, other, run)
-    figures = (
-        plot_loop(other, run, title=title).figure,
-        plot_time(other, run, stroke=fit.stroke, half=band_of(fit, other), title=title)[0].figure,
-        plot_before_and_after(demo.runs),
-    )
+    figures = (*shown_figures(fit, other).values(), plot_before_and_after(demo.runs))
 
     def save(place: Path) -> list[Path]:
         with result_set(place) as folder:
@@ -68,7 +65,7 @@ def _measured(output: Output, seed: int) -> None:
                 write_log(demo.log, folder / "log.csv"),
                 write_log(other.full, folder / "other.csv"),
                 *save_identification(fit, folder),
-                *save_figures(dict(zip(PICTURES, figures, strict=True)), folder),  # type: ignore[arg-type]
+                *save_figures(dict(zip(PICTURES, figures, strict=True)), folder),
             ]
 
     words = [

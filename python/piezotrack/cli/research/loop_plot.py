@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..._support.display.plot_style import (
-    ACTUAL,
-    DESIRED,
     ERROR,
     FEEDFORWARD,
     GUIDE,
@@ -21,11 +17,12 @@ from ..._support.display.plot_style import (
     trace,
     whole,
 )
+from ...control.views.tracking_plot import plot_following
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from matplotlib.axes import Axes
+    import numpy as np
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
@@ -53,11 +50,9 @@ def plot_before_and_after(
     share(right, left)
     share(right, left, "y")
     for ax, when, name in ((left, "Before", names[0]), (right, "After", names[-1])):
-        _plot_loop(ax, runs[name])
+        plot_following(runs[name], ax)
         rms = 1e6 * runs[name].metrics.rms_error
         heading(ax, f"{when}: {name}, error {rms:.2g} um rms")
-    # Below the lines there is room.
-    left.legend(loc="lower right", fontsize="small", edgecolor="none")
     for name, style in zip(names, STYLES, strict=True):
         part = _settled(runs[name])
         error = 1e6 * runs[name].error[part]
@@ -70,11 +65,3 @@ def plot_before_and_after(
 
 def _settled(run: Tracking) -> NDArray[np.bool_]:
     return run.part(run.t, None, None)
-
-
-def _plot_loop(ax: Axes, run: Tracking) -> None:
-    part = _settled(run)
-    ax.plot(1e6 * run.desired[part], 1e6 * run.measured[part], **{**ACTUAL, "label": "measured"})
-    ends = 1e6 * np.array([run.desired.min(), run.desired.max()])
-    ax.plot(ends, ends, **DESIRED)
-    ax.set(xlabel="desired displacement [um]", ylabel="measured displacement [um]")

@@ -11,7 +11,7 @@ from ..._support.display.plot_style import (
     GREY,
     drawing,
     heading,
-    is_narrow,
+    leftmost,
     legend_inside,
     names_beside,
     plain_log_ticks,
@@ -22,6 +22,8 @@ from ..._support.display.plot_style import (
 from .comparison_table import short
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
@@ -47,35 +49,49 @@ def plot_controllers(
     size = (12.0, 2.2 + 0.36 * len(rows))
     least = 1.5 + 0.25 * len(rows)
     drawn, axes = sheet(fig, size, (("references", "stages"),), least=least)
-    left, right = axes.values()
-    share(right, left, "y")
-    places = np.arange(float(len(rows)))[::-1]
-    for k, name in enumerate(comparison.references):
-        cells = [row.cells[0][k] for row in rows]
-        errors = [math.nan if one is None else 1e9 * one.rms for one in cells]
-        _marks(left, errors, places, k, len(comparison.references), short(name))
-    for k, name in enumerate(comparison.variants):
-        errors = [100.0 * row.relative(k) for row in rows]
-        _marks(right, errors, places, k, len(comparison.variants), name)
-    ends = [[100.0 * row.searches[i] for row in rows] for i in (0, -1)]
-    right.hlines(places, ends[0], ends[1], color=GREY, zorder=0)
-    titles = ("each reference, as tuned for", "all references, each stage")
-    units = ("true error [nm rms]", "true error [% of the inverse alone]")
-    for axis, title, unit in zip((left, right), titles, units, strict=True):
-        axis.set_xscale("log")
-        plain_log_ticks(axis, "x")
-        axis.set_ylim(-0.5, len(rows) - 0.5)
-        axis.set_xlabel(unit)
-        heading(axis, title)
-        axis.grid(axis="y", alpha=0.3)
-        names_beside(axis, places, [row.name for row in rows])
-        if axis is right and not is_narrow(fig, size):
-            axis.tick_params(labelleft=False)
-        legend_inside(axis, ncols=3)
+    _references(comparison, axes["references"])
+    _stages(comparison, axes["stages"])
+    share(axes["stages"], axes["references"], "y")
+    leftmost(axes.values())
     return whole(drawn)
 
 
-def _marks(ax: Axes, values: list[float], places: Array, k: int, count: int, label: str) -> None:
-    """Draw the marks of one series, which are above those of the next in each row."""
-    shift = 0.5 * ((count - 1) / 2.0 - k) / max(count, 1)
-    ax.plot(values, places + shift, MARKERS[k % len(MARKERS)], label=label, alpha=0.8)
+def _references(comparison: ControllerComparison, ax: Axes) -> None:
+    """Draw the error of each controller along each reference."""
+    errors = {}
+    for k, name in enumerate(comparison.references):
+        cells = [row.cells[0][k] for row in comparison.rows]
+        errors[short(name)] = [math.nan if one is None else 1e9 * one.rms for one in cells]
+    _rows(comparison, ax, errors)
+    ax.set_xlabel("true error [nm rms]")
+    heading(ax, "each reference, as tuned for")
+
+
+def _stages(comparison: ControllerComparison, ax: Axes) -> None:
+    """Draw the error of each controller over all references on each stage."""
+    rows = comparison.rows
+    low, high = ([100.0 * row.searches[i] for row in rows] for i in (0, -1))
+    ax.hlines(_places(comparison), low, high, color=GREY, zorder=0)
+    stages = enumerate(comparison.variants)
+    _rows(comparison, ax, {name: [100.0 * row.relative(k) for row in rows] for k, name in stages})
+    ax.set_xlabel("true error [% of the inverse alone]")
+    heading(ax, "all references, each stage")
+
+
+def _places(comparison: ControllerComparison) -> Array:
+    """Heights of the controllers, the first at the top."""
+    return np.arange(float(len(comparison.rows)))[::-1]
+
+
+def _rows(comparison: ControllerComparison, ax: Axes, errors: Mapping[str, list[float]]) -> None:
+    """Draw the errors of all controllers, those of a series above those of the next in each row."""
+    places = _places(comparison)
+    for k, (name, values) in enumerate(errors.items()):
+        shift = 0.5 * ((len(errors) - 1) / 2.0 - k) / len(errors)
+        ax.plot(values, places + shift, MARKERS[k % len(MARKERS)], label=name, alpha=0.8)
+    ax.set_xscale("log")
+    plain_log_ticks(ax, "x")
+    ax.set_ylim(-0.5, len(places) - 0.5)
+    ax.grid(axis="y", alpha=0.3)
+    names_beside(ax, places, [row.name for row in comparison.rows])
+    legend_inside(ax, ncols=3)

@@ -20,6 +20,7 @@ from ..._support.display.plot_style import (
     literal,
     share,
     sheet,
+    stack,
     trace,
     whole,
 )
@@ -118,8 +119,9 @@ def plot_contour(run: Contour, fig: Figure | SubFigure | None = None) -> Figure:
     share(axes["y"], axes["x"], "y")
     for name, axis in (("x", run.x), ("y", run.y)):
         error = 1e6 * axis.error[part]
-        trace(axes[name], run.t[part], error, ERROR, zero=True, ylabel=f"error of {name} [um]")
-    axes["y"].set_xlabel("time [s]")
+        trace(axes[name], run.t[part], error, ERROR, zero=True)
+        axes[name].set(xlabel="time [s]", ylabel=f"error of {name} [um]")
+    stack((axes["x"], axes["y"]), numbers=True)
     plot_contour_error(run, axes["error"])
     metrics = run.metrics
     caption(

@@ -16,8 +16,8 @@ from ..._support.display.plot_style import (
     caption,
     drawing,
     legend_inside,
-    share,
     sheet,
+    stack,
     whole,
 )
 
@@ -43,12 +43,13 @@ def plot_loop_report(report: LoopReport, fig: Figure | SubFigure | None = None) 
     dark = {**COMMAND, "color": "0.2", "linewidth": 1.4}
     size.loglog(f, np.abs(curves.open_loop), **{**dark, "label": "open loop |L|"})
     size.axhline(1.0, **GUIDE)
-    size.set(ylabel="magnitude")
+    size.set(xlabel="frequency [Hz]", ylabel="magnitude")
     degrees = np.degrees(np.angle(curves.open_loop))
     # A line across the panel would be drawn where the phase goes through -180 degrees.
     degrees[1:][np.abs(np.diff(degrees)) > 180.0] = np.nan
     phase.semilogx(f, degrees, **{**dark, "label": "phase of L"})
-    phase.set(ylabel="phase [deg]", ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
+    phase.set(xlabel="frequency [Hz]", ylabel="phase [deg]")
+    phase.set(ylim=(-190, 190), yticks=(-180, -90, 0, 90, 180))
     parts.loglog(f, np.abs(curves.sensitivity), **{**ERROR, "label": "sensitivity |S|"})
     closed = {**ACTUAL, "linewidth": 1.2, "label": "complementary |T|"}
     parts.loglog(f, np.abs(curves.complementary), **closed)
@@ -58,9 +59,7 @@ def plot_loop_report(report: LoopReport, fig: Figure | SubFigure | None = None) 
     parts.axhline(1.0, **GUIDE)
     parts.set(xlabel="frequency [Hz]", ylabel="magnitude")
     _mark_crossover(report, size, phase)
-    for ax in (size, phase):
-        share(ax, parts)
-        ax.tick_params(labelbottom=False)
+    stack((size, phase, parts))
     for ax in (size, parts):
         ax.set_ylim(bottom=max(LOWEST, ax.get_ylim()[0]))
         ax.margins(x=0)

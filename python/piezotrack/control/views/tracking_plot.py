@@ -22,6 +22,7 @@ from ..._support.display.plot_style import (
     drawing,
     legend_inside,
     literal,
+    path,
     share,
     sheet,
     thinned,
@@ -90,7 +91,8 @@ def plot_following(run: Tracking, ax: Axes | None = None) -> Axes:
     """Plot measured against desired displacement, from the settled time on."""
     (ax,) = axes_or_new(ax, 1)
     part = run.t >= run.settled
-    ax.plot(1e6 * run.desired[part], 1e6 * run.measured[part], **{**ACTUAL, "label": "measured"})
+    measured = {**ACTUAL, "label": "measured"}
+    path(ax, 1e6 * run.desired[part], 1e6 * run.measured[part], measured)
     ends = np.array([run.desired.min(), run.desired.max()]) * 1e6
     ax.plot(ends, ends, **{**DESIRED, "label": "measured = desired"})
     ax.set(xlabel="desired displacement [um]", ylabel="measured displacement [um]")

@@ -11,8 +11,8 @@ from ..._support.display.plot_style import (
     drawing,
     heading,
     literal,
-    share,
     sheet,
+    stack,
     thinned,
     trace,
     whole,
@@ -33,15 +33,15 @@ def plot_dataset(data: Dataset, fig: Figure | SubFigure | None = None) -> Figure
     rows = (("drive", "loop"), ("displacement", "loop"))
     figure, axes = sheet(fig, (11.0, 4.8), rows, widths=(1.35, 1.0), down=True)
     drive, displacement, loop = (axes[name] for name in ("drive", "displacement", "loop"))
-    share(drive, displacement)
     unit, scale = best_length_unit(data.stroke)
     name, times = shown_unit(data.drive_unit)
     u = times * data.u
     y = scale * data.y
     of_drive, in_metres = f"drive [{literal(name)}]", f"displacement [{unit}]"
     dark = {**COMMAND, "color": "0.2", "linewidth": 1.1}
-    trace(drive, data.t, u, dark, steps=data.hold == "zoh", ylabel=of_drive)
+    trace(drive, data.t, u, dark, steps=data.hold == "zoh", xlabel="time [s]", ylabel=of_drive)
     trace(displacement, data.t, y, RECORDED, xlabel="time [s]", ylabel=in_metres)
+    stack((drive, displacement), numbers=True)
     kept = thinned(y)
     loop.plot(u[kept], y[kept], **RECORDED)
     loop.set(xlabel=of_drive, ylabel=in_metres)

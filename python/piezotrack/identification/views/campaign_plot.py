@@ -14,7 +14,7 @@ from ..._support.display.plot_style import (
     caption,
     drawing,
     heading,
-    is_narrow,
+    leftmost,
     legend_inside,
     literal,
     names_beside,
@@ -56,8 +56,7 @@ def plot_campaign(campaign: Campaign, fig: Figure | SubFigure | None = None) -> 
         _apart(campaign, axes[1])
     for ax in axes:
         _records(campaign, ax)
-        if ax is not axes[0] and not is_narrow(fig, (11.0, height)):
-            ax.tick_params(labelleft=False)
+    leftmost(axes)
     caption(figure, size_of(campaign))
     handles, labels = axes[0].get_legend_handles_labels()
     if handles:

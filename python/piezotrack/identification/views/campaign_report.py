@@ -17,12 +17,18 @@ __all__ = ["campaign_html", "campaign_text"]
 MOST_ROWS, MOST_FAILED = 60, 20
 COLUMNS = (
     *(Column(head, left=True) for head in ("record", "model")),
-    *(Column(head, before=3) for head in ("seeds", "lowest", "median", "highest", "agree")),
-    Column("found", left=True),
+    Column("seeds", before=3),
+    *(Column(head, "%", before=3) for head in ("lowest rms", "median", "highest")),
+    Column("agree", before=3),
+    Column("model found", before=3, left=True),
 )
+SINGLE = (*COLUMNS[:2], Column("rms", "%", before=3), COLUMNS[-1])
+SEEDS = """\
+lowest, median and highest of the seeds; agree: how many seeds end within 0.1 % of the lowest;
+-: one result alone, as of least squares, which need no seed."""
 NOTES = """\
-rms on what was fitted, in % of the stroke, of the seeds; agree: seeds within 0.1 % of the lowest.
-To choose a model, test it on other data (compare)."""
+rms: error on the data that were fitted, in % of their stroke. More parameters make it smaller: to
+choose a model, judge models on other data (compare)."""
 
 
 def campaign_text(campaign: Campaign) -> str:
@@ -40,16 +46,18 @@ def campaign_text(campaign: Campaign) -> str:
     """
     lines = [_heading(campaign), "", *_table(campaign).lines()]
     if (more := len(campaign.groups) - MOST_ROWS) > 0:
-        lines.append(f"  and {more} more: to_frame() has them all")
+        lines.append(f"  and {more} more rows: to_frame() has them all")
     failed = _failed(campaign)
     lines += ["", *(f"failed  {name}: {error}" for name, error in failed[:MOST_FAILED])]
     if (more := len(failed) - MOST_FAILED) > 0:
         lines.append(f"failed  {more} more")
     if failed:
-        lines += ["The same call tries them again.", ""]
+        lines += ["The same call tries these again.", ""]
     if noted := sum(bool(one.notes) for one in campaign):
-        lines.append(f"note  {noted} of {len(campaign)} results have notes: see its .notes")
-    return "\n".join([*lines, NOTES])
+        lines.append(
+            f"{noted} of {len(campaign)} results have warnings: notes of each, and in its file"
+        )
+    return "\n".join([*lines, NOTES, *([SEEDS] if _several(campaign) else [])])
 
 
 def campaign_html(campaign: Campaign) -> str:
@@ -62,7 +70,14 @@ def campaign_html(campaign: Campaign) -> str:
 
 def _table(campaign: Campaign) -> Table:
     rows = [_row(*key, group) for key, group in list(campaign.groups.items())[:MOST_ROWS]]
-    return Table(COLUMNS, rows, _heading(campaign))
+    if _several(campaign):
+        return Table(COLUMNS, rows, _heading(campaign))
+    return Table(SINGLE, [(*row[:2], row[3], row[-1]) for row in rows], _heading(campaign))
+
+
+def _several(campaign: Campaign) -> bool:
+    """Whether a model was found with several seeds."""
+    return any(len(group) > 1 for group in campaign.groups.values())
 
 
 def _agreeing(group: list[TaskResult]) -> int:

@@ -7,19 +7,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._support.display.look import CHOSEN
 from ..._support.display.plot_style import (
     GUIDE,
     MEASURED,
     MODELS,
     QUIET,
     caption,
+    columns,
     drawing,
     heading,
-    is_narrow,
+    legend_below,
     literal,
     names_beside,
-    panels,
-    share,
+    stack,
     trace,
     whole,
 )
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from numpy.typing import NDArray
 
+    from ...data.dataset import Dataset
     from ..comparison.compare import Comparison, ModelScore
 
     Array = NDArray[np.float64]
@@ -44,25 +46,20 @@ JUDGED: dict[str, Any] = {"color": "0.35", "edgecolor": "0.2", "label": "not fit
 def plot_comparison(comparison: Comparison, fig: Figure | SubFigure | None = None) -> Figure:
     """Put loops, errors and bars on one sheet."""
     rows = comparison.rows
-    size = (11.0, max(8.2, 0.9 * len(rows) + 3.0))
-    if is_narrow(fig, size):
-        figure = panels(fig, (11.0, 18.0 + 2.2 * len(rows)))
-        grid = figure.add_gridspec(2, 1, height_ratios=[18.0, 2.2 * len(rows)])
-    else:
-        figure = panels(fig, size)
-        grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
     # The names have a place of their own below the loop.
-    heights = [1.5, 0.3 + 0.045 * len(rows), 1.1, 0.7 + 0.24 * len(rows)]
-    left = grid[0].subgridspec(len(heights), 1, height_ratios=heights)
-    right = grid[1].subgridspec(len(rows), 1)
-    loop = figure.add_subplot(left[0])
-    _loops(comparison, loop, figure.add_subplot(left[-2], sharex=loop))
-    below = figure.add_subplot(left[1])
-    below.set_axis_off()
-    named = loop.get_legend_handles_labels()
-    below.legend(*named, loc="center", frameon=False, fontsize="small", handlelength=4.0)
-    _bars(comparison, figure.add_subplot(left[-1]))
-    _errors(comparison, [figure.add_subplot(right[i]) for i in range(len(rows))])
+    left = {"loop": 2.6, "loop error": 1.9, "rms": 1.2 + 0.4 * len(rows)}
+    right = {f"error of {row.name}": 1.1 for row in rows}
+    figure, axes = columns(fig, 11.0, (left, right), (1.0, 1.35))
+    followed = [comparison.followed(row, "test") for row in rows]
+    cycle = _cycle(comparison.test, followed)
+    _loop(comparison, followed, cycle, axes["loop"])
+    _loop_error(comparison, followed, cycle, axes["loop error"])
+    stack([axes["loop"], axes["loop error"]])
+    _bars(comparison, axes["rms"])
+    below = [axes[name] for name in right]
+    for row, line, ax in zip(rows, _lines(comparison), below, strict=True):
+        _error(comparison, row, line["color"], ax)
+    stack(below)
     caption(figure, _title(comparison))
     return whole(figure)
 
@@ -78,36 +75,46 @@ def _title(comparison: Comparison) -> str:
     )
 
 
-def _loops(comparison: Comparison, loop: Axes, off: Axes) -> None:
-    """Draw the cycle on which a model is furthest off: loops, and errors over the drive."""
-    data = comparison.test
-    followed = [comparison.followed(row, "test") for row in comparison.rows]
-    part = _cycle(data.u, np.max([np.abs(data.y - x) for x in followed], axis=0))
-    drive, times = shown_unit(data.drive_unit)
-    u, y = times * data.u[part], data.y[part]
-    unit, scale = best_length_unit(data.stroke)
-    worst = max(float(np.abs(y - x[part]).max()) for x in followed)
-    small, fine = best_length_unit(worst)
-    loop.plot(u, scale * y, **MEASURED)
-    for row, x, line in zip(comparison.rows, followed, _lines(comparison), strict=True):
-        loop.plot(u, scale * x[part], label=literal(row.title), linewidth=1.1, **line)
-        off.plot(u, fine * (y - x[part]), label=literal(row.title), linewidth=1.1, **line)
-    off.axhline(0.0, **GUIDE)
-    loop.set(ylabel=f"displacement [{unit}]")
-    loop.tick_params(labelbottom=False)
-    off.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"error [{small}]")
-    when = f"{data.t[part][0]:.4g} to {data.t[part][-1]:.4g} s"
-    where = "" if comparison.carried else f" of {literal(data.source or 'the other record')}"
-    heading(loop, f"Loop with the largest error\n({when}{where})")
-    heading(off, "Its error = measured - simulated")
-
-
-def _cycle(u: Array, off: Array) -> slice:
-    """Find the cycle of a drive with the largest error, all of it where there is no cycle."""
+def _cycle(data: Dataset, followed: list[Array]) -> slice:
+    """Find the cycle with the largest error of a model, all of it where there is no cycle."""
+    u, off = data.u, np.max([np.abs(data.y - x) for x in followed], axis=0)
     middle = 0.5 * (float(u.min()) + float(u.max()))
     up = np.flatnonzero((u[:-1] < middle) & (u[1:] >= middle)) + 1
     cycles = [slice(int(first), int(last) + 1) for first, last in pairwise(up)]
     return max(cycles, key=lambda one: float(off[one].max()), default=slice(None))
+
+
+def _loop(comparison: Comparison, followed: list[Array], cycle: slice, ax: Axes) -> None:
+    """Draw the loops of a cycle."""
+    data = comparison.test
+    unit, scale = best_length_unit(data.stroke)
+    _, times = shown_unit(data.drive_unit)
+    ax.plot(times * data.u[cycle], scale * data.y[cycle], **MEASURED)
+    _over_drive(comparison, [scale * x for x in followed], cycle, ax)
+    ax.set_ylabel(f"displacement [{unit}]")
+    when = f"{data.t[cycle][0]:.4g} to {data.t[cycle][-1]:.4g} s"
+    where = "" if comparison.carried else f" of {literal(data.source or 'the other record')}"
+    heading(ax, f"Loop with the largest error\n({when}{where})")
+    legend_below(ax)
+
+
+def _loop_error(comparison: Comparison, followed: list[Array], cycle: slice, ax: Axes) -> None:
+    """Draw the errors of a cycle over the drive."""
+    errors = [comparison.test.y - x for x in followed]
+    unit, scale = best_length_unit(max(float(np.abs(one[cycle]).max()) for one in errors))
+    _over_drive(comparison, [scale * one for one in errors], cycle, ax)
+    ax.axhline(0.0, **GUIDE)
+    ax.set_ylabel(f"error [{unit}]")
+    heading(ax, "Its error = measured - simulated")
+
+
+def _over_drive(comparison: Comparison, signals: list[Array], cycle: slice, ax: Axes) -> None:
+    """Draw a signal of each model in a cycle over the drive."""
+    drive, times = shown_unit(comparison.test.drive_unit)
+    u = times * comparison.test.u[cycle]
+    for row, one, line in zip(comparison.rows, signals, _lines(comparison), strict=True):
+        ax.plot(u, one[cycle], label=literal(row.title), linewidth=1.1, **line)
+    ax.set_xlabel(f"drive [{literal(drive)}]")
 
 
 def _bars(comparison: Comparison, ax: Axes) -> None:
@@ -128,37 +135,32 @@ def _bars(comparison: Comparison, ax: Axes) -> None:
     ax.legend(fontsize="small", frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
 
 
-def _errors(comparison: Comparison, axes: list[Axes]) -> None:
-    """Draw measured less simulated over time, one model below the other on one scale."""
+def _error(comparison: Comparison, row: ModelScore, color: str, ax: Axes) -> None:
+    """Draw measured less simulated of a model over time, on one scale for all models."""
     first, second = comparison.train, comparison.test
     # Another record is drawn after the end of the first.
     gap = 0.0 if comparison.carried else float(first.t[-1] - second.t[0]) + second.dt
     # The test may also come before what was fitted.
     split = max(float(first.t[0]), float(second.t[0]) + gap) - 0.5 * first.dt
-    worst = max(max(row.train.max_error, row.test.max_error) for row in comparison.rows)
+    worst = max(max(one.train.max_error, one.test.max_error) for one in comparison.rows)
     unit, scale = best_length_unit(worst)
     reach = 1.1 * scale * worst or 1.0
-    for ax, row, line in zip(axes, comparison.rows, _lines(comparison), strict=True):
-        for t, error in (
-            (first.t, first.y - comparison.followed(row, "train")),
-            (second.t + gap, second.y - comparison.followed(row, "test")),
-        ):
-            trace(ax, t, scale * error, {"color": line["color"], "linewidth": 0.7})
-        ax.axhline(0.0, **GUIDE)
-        ax.axvline(split, **QUIET)
-        ax.set_ylim(-reach, reach)
-        if ax is axes[len(axes) // 2]:
-            ax.set_ylabel(f"error [{unit}]")
-        ax.set_title(_heading(row), fontsize="small", loc="left")
-        share(ax, axes[0])
-        ax.tick_params(labelbottom=ax is axes[-1])
+    for t, error in (
+        (first.t, first.y - comparison.followed(row, "train")),
+        (second.t + gap, second.y - comparison.followed(row, "test")),
+    ):
+        trace(ax, t, scale * error, {"color": color, "linewidth": 0.7})
+    ax.axhline(0.0, **GUIDE)
+    ax.axvline(split, **QUIET)
+    ax.set_title(_heading(row), fontsize="small", loc="left")
     how = "" if comparison.carried else ", the other record after the first"
-    axes[-1].set_xlabel(f"time [s]{how}")
-    words = ("fitted ", " not fitted")
-    if float(second.t[0]) + gap < first.t[0]:
+    ax.set(xlabel=f"time [s]{how}", ylabel=f"error [{unit}]", ylim=(-reach, reach))
+    # In one picture they are named at the top.
+    words = ("fitted ", " not fitted") if CHOSEN.get() or row is comparison.rows[0] else ()
+    if words and float(second.t[0]) + gap < first.t[0]:
         words = ("not fitted ", " fitted")
-    for text, side in zip(words, ("right", "left"), strict=True):
-        axes[0].annotate(
+    for text, side in zip(words, ("right", "left"), strict=False):
+        ax.annotate(
             text,
             (split, 0.96),
             xycoords=("data", "axes fraction"),

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from ..._support.display.plot_style import whole
 from ..._support.files.writing import make_folder, picture_files, result_set, save_figures
-from .plot import band_of, named, plot_convergence, plot_loop, plot_time, what_was_fitted
+from .plot import (
+    band_of,
+    named,
+    plot_convergence,
+    plot_loop,
+    plot_time,
+    what_was_fitted,
+    what_was_shown,
+)
 
 if TYPE_CHECKING:
     import os
     from pathlib import Path
 
-    from ...data.dataset import Dataset
-    from ..fitted.identification import Identification
+    from matplotlib.figure import Figure
 
-__all__ = ["identification_files", "save_identification"]
+    from ...data.dataset import Dataset
+    from ...stages.motion import Response
+    from ..fitted.identification import Identification
+    from ..fitted.identified_model import IdentifiedModel
+
+__all__ = ["identification_files", "save_identification", "shown_figures"]
 
 
 def identification_files(name: str, *, searched: bool, records: int = 1) -> list[str]:
@@ -73,24 +86,31 @@ def save_identification(
     """
     name = fit.model.info.name if name is None else name
     until = None if shown is None else float(fit.data.t[-1])
-    figures = {}
+    figures: dict[str, Figure] = {}
     for i, record in enumerate(fit.records):
         data = record.data if shown is None else shown
         if data is None:
             continue
         run = fit.simulate(data, offset=record.offset)
         title = what_was_fitted(fit, record)
-        above, _ = plot_time(
-            data,
-            run,
-            stroke=record.stroke,
-            fitted_until=until,
-            half=band_of(fit, data),
-            title=title,
-        )
-        figures[f"{name}_loop{_nth(i)}"] = plot_loop(data, run, title=title).figure
-        figures[f"{name}_time{_nth(i)}"] = above.figure
+        drawn = _figures(fit, data, run, title, stroke=record.stroke, fitted_until=until)
+        figures |= {f"{name}_{panel}{_nth(i)}": one for panel, one in drawn.items()}
     if fit.model.info.searched:
-        figures[f"{name}_convergence"] = plot_convergence(fit, title=named(fit, fit.data)).figure
+        converged = plot_convergence(fit, title=named(fit, fit.data))
+        figures[f"{name}_convergence"] = whole(converged.figure)
     with result_set(make_folder(folder)) as path:
-        return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]  # type: ignore[arg-type]
+        return [fit.save(path / f"{name}.json"), *save_figures(figures, path)]
+
+
+def shown_figures(model: IdentifiedModel, data: Dataset) -> dict[str, Figure]:
+    """Draw loop and displacement of a model on any record, in figures of their own."""
+    run = model.simulate(data)
+    return _figures(model, data, run, what_was_shown(model, data, run), stroke=model.stroke)
+
+
+def _figures(
+    model: IdentifiedModel, data: Dataset, run: Response, title: str, **options: Any
+) -> dict[str, Figure]:
+    above, _ = plot_time(data, run, half=band_of(model, data), title=title, **options)
+    loop = plot_loop(data, run, title=title)
+    return {"loop": whole(loop.figure), "time": whole(above.figure)}

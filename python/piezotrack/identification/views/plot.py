@@ -5,11 +5,12 @@ Every function takes the axes to draw on and returns them, so that the pictures 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..._support.arguments import expect, finite, positive
+from ..._support.display.look import CHOSEN
 from ..._support.display.plot_style import (
     BAND,
     ERROR,
@@ -21,10 +22,8 @@ from ..._support.display.plot_style import (
     caption,
     drawing,
     heading,
-    is_narrow,
     legend_inside,
     literal,
-    panels,
     plain_log_ticks,
     share,
     sheet,
@@ -60,6 +59,7 @@ __all__ = [
     "plot_model",
     "plot_model_loop",
     "plot_model_time",
+    "plot_record",
     "plot_response",
     "plot_time",
     "what_was_fitted",
@@ -130,8 +130,9 @@ def plot_time(
     if data.left_out is not None:
         error[data.left_out] = np.nan
     small, fine = best_length_unit(float(np.abs(data.counted(error)).max()))
+    words = "time [s]" if CHOSEN.get() else ""
     for y, style in ((data.y, MEASURED), (run.x, SIMULATED)):
-        trace(above, data.t, scale * y, style, ylabel=f"displacement [{unit}]")
+        trace(above, data.t, scale * y, style, xlabel=words, ylabel=f"displacement [{unit}]")
     heading(above, title)
     if fitted_until is not None:
         mark = {**QUIET, "label": "fitted before, predicted after"}
@@ -251,15 +252,22 @@ def plot_model(
     searched = fit is not None and fit.model.info.searched
     rows = (("loop", "time"), ("convergence" if searched else "loop", "error"))
     figure, axes = sheet(fig, (11.0, 6.6 if searched else 5.6), rows, widths=(1.0, 1.35), down=True)
-    plot_loop(record, run, axes["loop"])
+    plot_record(record, run, axes, stroke=model.stroke, half=band_of(model, record))
     if fit is not None and searched:
         plot_convergence(fit, axes["convergence"])
-    both = axes["time"], axes["error"]
-    share(both[1], both[0])
-    plot_time(record, run, both, stroke=model.stroke, half=band_of(model, record))
     title = what_was_shown(model, record, run)
     caption(figure, what_was_fitted(fit) if fit and data is None else title)
     return whole(figure)
+
+
+def plot_record(
+    record: Dataset, run: Response, axes: Mapping[str, Axes], which: str = "", **options: Any
+) -> None:
+    """Draw loop, displacement and error of a record in the panels of these names, and an end."""
+    both = axes[f"time{which}"], axes[f"error{which}"]
+    plot_loop(record, run, axes[f"loop{which}"])
+    share(both[1], both[0])
+    plot_time(record, run, both, **options)
 
 
 @drawing
@@ -328,25 +336,23 @@ def _shown(model: IdentifiedModel, data: Dataset | None) -> tuple[Dataset, Respo
 
 def _of_records(fit: Identification, fig: Figure | SubFigure | None) -> Figure:
     """Draw loop, displacement and error of each record, and the convergence below."""
-    # Below each other three panels of a record take more than beside each other.
-    high = 21.0 if is_narrow(fig, (11.0, 4.6)) else 4.6
-    heights = [high] * len(fit.records) + ([3.0 * high / 9.0] if fit.model.info.searched else [])
-    figure = panels(fig, (11.0, sum(heights)))
-    parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-    for record, part in zip(fit.records, parts, strict=False):
-        if record.data is None:
-            continue
-        run = fit.simulate(record.data, offset=record.offset)
-        rows = (("loop", "time"), ("loop", "error"))
-        _, axes = sheet(part, (11.0, 4.6), rows, widths=(1.0, 1.35))
-        plot_loop(record.data, run, axes["loop"])
-        both = axes["time"], axes["error"]
-        share(both[1], both[0])
-        half = band_of(fit, record.data)
-        plot_time(record.data, run, both, stroke=record.stroke, half=half)
-        caption(part, what_was_fitted(fit, record))
+    shown = {f" {i}": one for i, one in enumerate(fit.records, 1) if one.data is not None}
+    rows = []
+    for which in shown:
+        rows += [(f"loop{which}", f"time{which}"), (f"loop{which}", f"error{which}")]
+    heights = [2.3] * len(rows)
     if fit.model.info.searched:
-        plot_convergence(fit, parts[-1].subplots())
+        rows.append(("convergence", "convergence"))
+        heights.append(1.6)
+    figure, axes = sheet(fig, (11.0, sum(heights)), rows, heights=heights, widths=(1.0, 1.35))
+    for which, record in shown.items():
+        assert record.data is not None
+        run = fit.simulate(record.data, offset=record.offset)
+        half = band_of(fit, record.data)
+        title = what_was_fitted(fit, record)
+        plot_record(record.data, run, axes, which, stroke=record.stroke, half=half, title=title)
+    if fit.model.info.searched:
+        plot_convergence(fit, axes["convergence"])
     return whole(figure)
 
 

@@ -14,6 +14,7 @@ from ..._support.display.plot_style import (
     drawing,
     legend_inside,
     sheet,
+    stack,
     trace,
     whole,
 )
@@ -94,8 +95,9 @@ def plot_tracking(run: MultiAxisTracking, fig: Figure | SubFigure | None = None)
         signals = run.y[:, k], run.reference[:, k]
         unit, scale = best_length_unit(max(float(np.abs(one).max()) for one in signals))
         trace(ax, time, scale * signals[0], style)
-        trace(ax, time, scale * signals[1], DESIRED, ylabel=f"{name} [{unit}]")
-    list(axes.values())[-1].set_xlabel("time [s]")
+        trace(ax, time, scale * signals[1], DESIRED)
+        ax.set(xlabel="time [s]", ylabel=f"{name} [{unit}]")
+    stack(list(axes.values()), numbers=True)
     legend_inside(next(iter(axes.values())), ncols=2)
     caption(figure, run.note, "medium")
     return whole(figure)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure, FigureBase, SubFigure
     from numpy.typing import NDArray
 
     from ...stages.base import Stage
@@ -123,6 +123,29 @@ def plot_frequency_response(
     response: FrequencyResponse, fig: Figure | SubFigure | None = None
 ) -> Figure:
     """Plot magnitude and phase over frequency, and the response in the complex plane."""
+    return whole(_panels(response, fig)[0])
+
+
+@drawing
+def plot_modal_fit(fit: ModalFit, fig: Figure | SubFigure | None = None) -> Figure:
+    """Plot a response with the fitted modes over it."""
+    figure, axes = _panels(fit.response, fig)
+    _, scale = fit.response.shown_unit
+    f, fitted = fit.response.frequency, fit.fitted
+    modes = {**DESIRED, "label": "modes and delay"}
+    axes["magnitude"].plot(f, scale * np.abs(fitted), **modes)
+    legend_inside(axes["magnitude"], ncols=2)
+    turn = np.unwrap(np.angle(fitted))
+    turn += 2.0 * np.pi * np.round((fit.response.phase[0] - turn[0]) / (2.0 * np.pi))
+    axes["phase"].plot(f, np.degrees(turn), **modes)
+    axes["nyquist"].plot(scale * fitted.real, scale * fitted.imag, **modes)
+    return whole(figure)
+
+
+def _panels(
+    response: FrequencyResponse, fig: Figure | SubFigure | None
+) -> tuple[FigureBase, dict[str, Axes]]:
+    """Draw a response in its three panels."""
     rows = (("magnitude", "nyquist"), ("phase", "nyquist"))
     figure, axes = sheet(fig, (11.0, 5.6), rows, heights=(3.0, 2.0), widths=(3.0, 2.0))
     plot_magnitude(response, axes["magnitude"])
@@ -130,24 +153,7 @@ def plot_frequency_response(
     plot_nyquist(response, axes["nyquist"])
     share(axes["phase"], axes["magnitude"])
     caption(figure, f"{response.excitation}", "medium")
-    return whole(figure)
-
-
-@drawing
-def plot_modal_fit(fit: ModalFit, fig: Figure | SubFigure | None = None) -> Figure:
-    """Plot a response with the fitted modes over it."""
-    figure = plot_frequency_response(fit.response, fig)
-    magnitude, nyquist, phase = (figure.axes[k] for k in range(3))
-    _, scale = fit.response.shown_unit
-    f, fitted = fit.response.frequency, fit.fitted
-    modes = {**DESIRED, "label": "modes and delay"}
-    magnitude.plot(f, scale * np.abs(fitted), **modes)
-    legend_inside(magnitude, ncols=2)
-    turn = np.unwrap(np.angle(fitted))
-    turn += 2.0 * np.pi * np.round((fit.response.phase[0] - turn[0]) / (2.0 * np.pi))
-    phase.plot(f, np.degrees(turn), **modes)
-    nyquist.plot(scale * fitted.real, scale * fitted.imag, **modes)
-    return figure
+    return figure, axes
 
 
 @drawing

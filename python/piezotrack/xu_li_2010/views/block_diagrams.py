@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..._support.display.plot_style import heading, panels, whole
+from ..._support.display.look import look
+from ..._support.display.plot_style import drawing, heading, is_narrow, sheet, whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["draw"]
+__all__ = ["plot_block_diagrams"]
 
 # Width of a diagram, height of a block and radius of a summing point, in its own units.
 WIDTH, TALL, RADIUS = 12.0, 1.0, 0.26
@@ -53,7 +54,7 @@ DAHL = Diagram(
     blocks=(
         Block(2.2, 4.0, 1.2, "$T$"),
         Block(7.0, 4.0, 3.6, "$1 / (M s^2 + D s + K)$"),
-        Block(7.0, 1.5, 4.6, r"$\dot V = A_h V \dot x + B_h u_p \dot x$,  $F_h = C_h V$"),
+        Block(7.0, 1.5, 4.6, "$\\dot V = A_h V \\dot x + B_h u_p \\dot x$,\n$F_h = C_h V$"),
     ),
     sums=((4.0, 4.0),),
     paths=(
@@ -102,7 +103,7 @@ FEEDFORWARD = Diagram(
 PID = Diagram(
     title="Fig. 10: PID with back-calculation, (22) to (25)",
     blocks=(
-        Block(2.6, 4.0, 2.8, "PID, incremental"),
+        Block(2.6, 4.0, 2.8, "PID,\nincremental"),
         Block(8.6, 4.0, 1.6, "limits"),
         Block(4.9, 1.2, 1.5, "$T_s / T_t$"),
     ),
@@ -168,21 +169,16 @@ ALL = Diagram(
 )
 
 
-def draw() -> Figure:
-    """Draw the four diagrams.
+DIAGRAMS = {"dahl": DAHL, "feedforward": FEEDFORWARD, "pid": PID, "all": ALL}
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Two by two.
-    """
-    figure = panels(None, (12.0, 6.0))
-    for diagram, ax in zip(
-        (DAHL, FEEDFORWARD, PID, ALL),
-        figure.subplots(2, 2, height_ratios=[0.8, 1.0]).flat,
-        strict=True,
-    ):
-        _draw(diagram, ax)
+
+@drawing
+def plot_block_diagrams(fig: Figure | SubFigure | None = None) -> Figure:
+    """Draw the four diagrams, two by two."""
+    rows = (("dahl", "feedforward"), ("pid", "all"))
+    figure, axes = sheet(fig, (WIDTH, 6.8), rows, heights=(0.8, 1.15))
+    for name, ax in axes.items():
+        _draw(DIAGRAMS[name], ax)
     return whole(figure)
 
 
@@ -193,18 +189,25 @@ def _draw(diagram: Diagram, ax: Axes) -> None:
     rows = [y for path in diagram.paths for _, y in path]
     ax.set(xlim=(0.0, WIDTH), ylim=(min(rows) - 0.8, max(rows) + 0.8), aspect="equal")
     ax.axis("off")
+    # Letters shrink with the diagram, and are read in a column still.
+    wide = whole(ax.figure).get_figwidth() / (1 if is_narrow(ax.figure, (WIDTH, WIDTH)) else 2)
+    size = max(6.5, 18.0 * wide / WIDTH)
+    middle: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": size}
+    thin = {"linewidth": 0.7 if look().paper else 1.0}
+    outline: dict[str, Any] = {"facecolor": "white", "edgecolor": INK, **thin}
     for block in diagram.blocks:
         corner = (block.x - 0.5 * block.width, block.y - 0.5 * TALL)
-        ax.add_patch(Rectangle(corner, block.width, TALL, facecolor="white", edgecolor=INK))
-        ax.text(block.x, block.y, block.text, ha="center", va="center", fontsize=9.0)
+        ax.add_patch(Rectangle(corner, block.width, TALL, **outline))
+        ax.text(block.x, block.y, block.text, **middle)
     for place in diagram.sums:
-        ax.add_patch(Circle(place, RADIUS, facecolor="white", edgecolor=INK))
-        ax.text(*place, r"$\Sigma$", ha="center", va="center", fontsize=8.0)
+        ax.add_patch(Circle(place, RADIUS, **outline))
+        ax.text(*place, r"$\Sigma$", **middle)
+    arrow = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0.0, "shrinkB": 0.0, **thin}
+    arrow["mutation_scale"] = size
     for path in diagram.paths:
         ax.plot(*zip(*path, strict=True), color=INK, linewidth=1.0, solid_joinstyle="miter")
-        arrow = {"arrowstyle": "-|>", "color": INK, "shrinkA": 0.0, "shrinkB": 0.0}
         ax.annotate("", path[-1], path[-2], arrowprops=arrow)
     for place in diagram.branches:
         ax.plot(*place, "o", color=INK, markersize=3.5)
     for label in diagram.labels:
-        ax.text(label.x, label.y, label.text, ha="center", va="center", fontsize=10.0)
+        ax.text(label.x, label.y, label.text, **middle)

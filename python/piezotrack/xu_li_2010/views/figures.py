@@ -16,10 +16,11 @@ from ..._support.display.plot_style import (
     heading,
     legend_inside,
     panels,
+    sheet,
     whole,
 )
 from ..experiments.references import RULES
-from . import block_diagrams
+from .block_diagrams import plot_block_diagrams
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -71,7 +72,7 @@ def drawn(experiments: Experiments, drives: Drives | None) -> list[Drawn]:
             "fig_05",
             "Figs. 5 and 8 to 11: block diagrams",
             "As implemented here.",
-            block_diagrams.draw(),
+            plot_block_diagrams(),
         ),
         Drawn(
             "fig_06",
@@ -161,21 +162,19 @@ def _convergence(fit: Identification) -> Figure:
 @drawing
 def _drives(drives: Drives) -> Figure:
     """Draw the drives over the reference and, less the line, over time."""
-    figure = panels(None, (11.0, 4.6))
-    left, right = figure.subplots(1, 2)
+    figure, axes = sheet(None, (11.0, 4.6), (("reference", "time"),))
     # Two periods of 1 Hz.
     part = drives.t < drives.t[0] + 2.0
-    t, um = drives.t[part], 1e6 * (drives.desired - drives.desired.mean())[part]
-    left.plot(um, (drives.measured - drives.line)[part], **MEASURED)
-    right.plot(t, (drives.measured - drives.line)[part], **MEASURED)
-    for (name, voltage), line in zip(drives.computed.items(), MODELS, strict=False):
-        added = (voltage - drives.line)[part]
-        left.plot(um, added, linewidth=1.1, label=name, **line)
-        right.plot(t, added, linewidth=1.1, label=name, **line)
-    left.set(xlabel="reference [um]", ylabel="drive - straight line [V]")
-    right.set(xlabel="time [s]", ylabel="drive - straight line [V]")
-    right.margins(x=0.0)
-    legend_inside(right, ncols=2)
+    um = 1e6 * (drives.desired - drives.desired.mean())
+    for name, over, words in (("reference", um, "[um]"), ("time", drives.t, "[s]")):
+        ax = axes[name]
+        ax.plot(over[part], (drives.measured - drives.line)[part], **MEASURED)
+        for (drive, voltage), line in zip(drives.computed.items(), MODELS, strict=False):
+            added = (voltage - drives.line)[part]
+            ax.plot(over[part], added, linewidth=1.1, label=drive, **line)
+        ax.set(xlabel=f"{name} {words}", ylabel="drive - straight line [V]")
+    axes["time"].margins(x=0.0)
+    legend_inside(axes["time"], ncols=2)
     return whole(figure)
 
 
@@ -183,8 +182,8 @@ def _drives(drives: Drives) -> Figure:
 def plot_reproduction(reproduction: Reproduction, fig: Figure | SubFigure | None = None) -> Figure:
     """Draw obtained over published of every number, with quartiles, in the order of the paper."""
     rows = reproduction.obtained
-    figure = panels(fig, (11.0, 5.0))
-    ax = figure.subplots()
+    figure, axes = sheet(fig, (11.0, 5.0), (("ratios",),))
+    ax = axes["ratios"]
     ratios = np.array([row.ratio for row in rows])
     quartiles = np.array([row.quartiles for row in rows]).T
     published = np.array([row.observable.published for row in rows])
@@ -198,7 +197,7 @@ def plot_reproduction(reproduction: Reproduction, fig: Figure | SubFigure | None
     ax.plot(places[~reached], ratios[~reached], **missed)
     figures = [row.observable.figure for row in rows]
     # As many names as have room beside each other.
-    apart, first = 0.14 * len(rows) / (whole(figure).get_figwidth() - 0.8), [0]
+    apart, first = 0.14 * len(rows) / (whole(ax.figure).get_figwidth() - 0.8), [0]
     for i, name in enumerate(figures):
         if name != figures[i - 1] and i - first[-1] >= apart:
             first.append(i)

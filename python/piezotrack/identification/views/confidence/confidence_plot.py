@@ -16,6 +16,8 @@ from ...._support.display.plot_style import (
     caption,
     drawing,
     heading,
+    in_rows,
+    leftmost,
     literal,
     sheet,
     whole,
@@ -39,23 +41,21 @@ def plot_confidence(confidence: Confidence, fig: Figure | SubFigure | None = Non
     """Draw the rise of the cost along each parameter, or the distribution of its refits."""
     each = confidence.parameters
     across = min(ACROSS, max(len(each), 1))
-    names = [*each, *("." for _ in range(-len(each) % across))]
-    rows = [names[i : i + across] for i in range(0, len(names), across)]
+    rows = in_rows(each, across)
     figure, axes = sheet(fig, (3.1 * across, 0.6 + 2.6 * len(rows)), rows)
     for name, one in each.items():
         ax = axes[name]
         _interval(ax, one)
         if confidence.draws:
             ax.hist(one.values, BINS, color=GREY)
-            label = "refits"
+            ax.set_ylabel("refits")
         else:
             _profile(ax, one)
-            label = "rise of the cost / threshold"
-        if name in [row[0] for row in rows]:
-            ax.set_ylabel(label)
+            ax.set_ylabel("rise of the cost / threshold")
         unit = f" [{literal(one.unit)}]" if one.unit else ""
         ax.set_xlabel(f"{name}{unit}")
         heading(ax, one.shape or "")
+    leftmost(axes.values(), numbers=True)
     caption(figure, f"Intervals of {100.0 * confidence.level:g} %")
     return whole(figure)
 

@@ -21,8 +21,8 @@ from ...._support.display.plot_style import (
     heading,
     legend_inside,
     literal,
-    share,
     sheet,
+    stack,
     thinned,
     whole,
 )
@@ -44,8 +44,8 @@ def plot_band(band: PredictionBand, fig: Figure | SubFigure | None = None) -> Fi
     figure, axes = sheet(fig, (11.0, 5.6), rows, widths=(1.0, 1.35))
     _loop(band, axes["loop"])
     _time(band, axes["time"])
-    share(axes["parts"], axes["time"])
     _parts(band, axes["parts"])
+    stack((axes["time"], axes["parts"]), numbers=True)
     return whole(figure)
 
 
@@ -75,7 +75,7 @@ def _time(band: PredictionBand, ax: Axes) -> None:
         ax.plot(t, scale * band.measured[kept], **MEASURED)
     ax.fill_between(t, scale * band.lower[kept], scale * band.upper[kept], **named)
     ax.plot(t, scale * band.x[kept], **{**SIMULATED, "label": "predicted"})
-    ax.set(ylabel=f"displacement [{unit}]")
+    ax.set(xlabel="time [s]", ylabel=f"displacement [{unit}]")
     heading(ax, "Displacement over time")
     ax.margins(x=0.0)
     legend_inside(ax)

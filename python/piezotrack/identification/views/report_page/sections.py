@@ -13,7 +13,7 @@ from ...._support.units import length_text, of_drive, shown_unit
 from ...confidence.residuals.residual import residual_of
 from ..confidence.residual_report import fit_notes, verdict
 from ..html import records_table
-from ..plot import band_of, plot_loop, plot_time, what_was_fitted
+from ..plot import band_of, plot_loop, plot_record, plot_time, what_was_fitted
 from ..quantities import errors_of, of_sensor, of_stage, predicted
 from ..report import list_sentences, parameter_notes, search_sentences, verdict_sentences
 
@@ -136,11 +136,9 @@ def _both(fit: Identification, record: FittedRecord, figure: Figure | SubFigure)
     data = record.data
     assert data is not None
     run = fit.simulate(data, offset=record.offset)
-    grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 1.5])
-    plot_loop(data, run, figure.add_subplot(grid[:, 0]))
-    above = figure.add_subplot(grid[0, 1])
-    below = figure.add_subplot(grid[1, 1], sharex=above)
-    plot_time(data, run, (above, below), stroke=record.stroke, half=band_of(fit, data))
+    axes = figure.subplot_mosaic([["loop", "time"], ["loop", "error"]], width_ratios=[1.0, 1.5])
+    plot_record(data, run, axes, stroke=record.stroke, half=band_of(fit, data))
+    below = axes["error"]
     below.set_title(below.get_title().removeprefix("error = measured - simulated: "), fontsize=8)
     figure.suptitle(what_was_fitted(fit, record), fontsize="medium")
 
