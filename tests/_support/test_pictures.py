@@ -22,6 +22,7 @@ from piezotrack._support.display.plot_style import folded, legend_inside, plain_
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
     from matplotlib.axes import Axes
 
@@ -32,6 +33,15 @@ PI = {"model": "prandtl-ishlinskii"}
 @cache
 def stage() -> pt.VirtualStage:
     return pt.VirtualStage.xu_li_2010(seed=1)
+
+
+def test_letters_of_a_pdf_are_outlines_that_journals_take(tmp_path: Path) -> None:
+    stage().record(np.linspace(0.0, 10.0, 50), 0.01).plot(style="paper", width="85mm").savefig(
+        tmp_path / "log.pdf"
+    )
+    content = (tmp_path / "log.pdf").read_bytes()
+    assert b"/Type3" not in content
+    assert b"/CIDFontType2" in content
 
 
 @cache

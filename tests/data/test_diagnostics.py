@@ -79,6 +79,11 @@ def test_nothing_is_said_of_measured_logs() -> None:
         pt.read(MEASURED / "training.csv")[3.0:23.0], "dahl", method=pt.Descents(seed=1)
     )
     assert re.match(r"the lag of .* ms contributes .* of the travel at this rate", fit.notes[0])
+    # The lag that is named is the model's, not the shortest that explains the record as well.
+    fit = pt.identify(pt.read(MEASURED / "training.csv")[3.0:23.0])
+    named = re.search(r"the lag of (\S+) ms", " ".join(fit.notes))
+    assert named
+    assert float(named[1]) == pytest.approx(1e3 * fit.model.time_constant, rel=5e-3)
 
 
 # Refusals.

@@ -134,3 +134,8 @@ def test_records_in_files_of_numpy_are_read_as_logs_are(tmp_path: Path) -> None:
         np.testing.assert_allclose(record.y, made.y, rtol=1e-14)
     with pytest.raises(pt.ParameterError, match="are a multiple"):
         read_axes(tmp_path / "flat.npz", drives=["v"], displacements=["z"], dt=made.dt, period=0.03)
+    rows = np.random.default_rng(1).standard_normal((200, 2))
+    table = np.column_stack([np.arange(200) * 0.01, rows])
+    np.savetxt(tmp_path / "once.csv", table, delimiter=",", header="t_s,u_V,y_um", comments="")
+    with pytest.raises(pt.DataError, match="no period was found in any drive"):
+        read_axes(tmp_path / "once.csv", drives=["u_V"], displacements=["y_um"])

@@ -223,6 +223,8 @@ def _realisation(
 
 def _common(name: str, counts: list[int | None], log: Dataset) -> int:
     """Return the samples of the period that all drives have."""
+    if not any(counts):
+        raise DataError(f"{name}: no period was found in any drive: period= gives it")
     if len(set(counts)) > 1 or counts[0] is None:
         known = ", ".join("none" if one is None else f"{one * log.dt:.6g} s" for one in counts)
         raise DataError(

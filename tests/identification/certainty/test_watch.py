@@ -111,6 +111,10 @@ def test_a_refit_is_accepted_only_where_it_is_better(tmp_path: Path) -> None:
     assert same is not None
     assert not same.accepted
     assert same.model is None
+    # Where the residual grows, its square is higher, and so are both ends of the interval.
+    kept = same._replace(improvement=-0.25, interval=(-0.3, -0.2))
+    worse = replace(pt.watch(model_watched(), watched(41)), refit=kept)
+    assert "mean square 25 % higher (20 to 30 %)" in str(worse)
     record = watched(41, gain=1.02)
     health = pt.watch(model_watched(), record, refit=True)
     refit = health.refit

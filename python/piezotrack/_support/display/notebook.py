@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
@@ -15,6 +17,11 @@ class Picture(Figure):
     The notebook shows the value of the last line, and then the inline backend all open figures:
     without this the same figure twice.
     """
+
+    def savefig(self, *args: Any, **keywords: Any) -> None:
+        """Save it as Matplotlib does; letters of a PDF are TrueType, as journals ask for."""
+        with mpl.rc_context({"pdf.fonttype": 42}):
+            super().savefig(*args, **keywords)
 
     def _ipython_display_(self) -> None:
         if "inline" in mpl.get_backend():

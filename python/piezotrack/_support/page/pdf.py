@@ -69,7 +69,7 @@ def write_pdf(page: Page, file: Path) -> None:
     import matplotlib as mpl
     from matplotlib.backends.backend_pdf import PdfPages
 
-    settings: Any = {"font.size": TYPE, "text.usetex": False}
+    settings: Any = {"font.size": TYPE, "text.usetex": False, "pdf.fonttype": 42}
     # Without a date the same content gives the same file.
     stamp = {"CreationDate": None, "Title": page.title}
     with mpl.rc_context(settings), PdfPages(file, metadata=stamp) as pdf:

@@ -188,7 +188,8 @@ def _check_online(controller: Controller) -> None:
         what = "a neural network"
     elif inverse._begun(controller.dt).coefficients() is None:
         creeps = inverse.stage.info.name == "dahl"
-        what = f"the inverse of a {inverse.stage.info.title} stage{' with creep' if creeps else ''}"
+        stage = f"{inverse.stage.info.title} stage{' with creep' if creeps else ''}"
+        what = f"the inverse of {'an' if stage[0] in 'aeiou' else 'a'} {stage}"
     else:
         return
     raise ParameterError(

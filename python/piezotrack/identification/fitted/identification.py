@@ -223,7 +223,8 @@ class Identification(IdentifiedModel):
             notes.append(f"the drive is in {unit}: forces are in {unit} too, not in N")
         rates = [_frequency(data) for data, _ in self._fitted]
         if self.lags is not None and (self.lags.from_zero or max(rates) < OTHER * min(rates)):
-            notes += lag_notes(self.lags, 2.0 * math.pi * rates[0])
+            lag = getattr(self.model, "time_constant", None)
+            notes += lag_notes(self.lags, 2.0 * math.pi * rates[0], lag)
         if self.at_bound:
             notes.append(
                 "the record does not determine the dynamics: time constant or mode lies on a bound"

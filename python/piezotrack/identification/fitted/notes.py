@@ -242,7 +242,7 @@ def start_notes(start: Start | None, data: Dataset) -> str | None:
     return f"in equilibrium at {drive_text(first, unit)}, {before}"
 
 
-def lag_notes(lags: LagRange | None, frequency: float) -> list[str]:
+def lag_notes(lags: LagRange | None, frequency: float, lag: float | None = None) -> list[str]:
     """Say which lags the record allows.
 
     Parameters
@@ -251,6 +251,8 @@ def lag_notes(lags: LagRange | None, frequency: float) -> list[str]:
         Lags that fit as well.
     frequency : float
         Frequency of the drive [rad/s].
+    lag : float, optional
+        Lag of the model [s]; by default the least one.
 
     Returns
     -------
@@ -259,7 +261,8 @@ def lag_notes(lags: LagRange | None, frequency: float) -> list[str]:
     """
     if lags is None:
         return []
-    share = lags.least * frequency
+    lag = lags.least if lag is None else lag
+    share = lag * frequency
     if lags.from_zero or share < VISCOUS:
         least = 0.0 if lags.from_zero else lags.least
         return [
@@ -267,9 +270,9 @@ def lag_notes(lags: LagRange | None, frequency: float) -> list[str]:
             "record at another rate determines it"
         ]
     return [
-        f"the lag of {1e3 * lags.least:.3g} ms contributes {100 * share:.2g} % of the travel at "
-        "this rate, and no shorter one fits: the model holds at this rate only. A record at "
-        "another rate distinguishes damping, creep and sensor delay"
+        f"the lag of {1e3 * lag:.3g} ms contributes {100 * share:.2g} % of the travel at this "
+        f"rate, and none below {1e3 * lags.least:.3g} ms fits: the model holds at this rate only. "
+        "A record at another rate distinguishes damping, creep and sensor delay"
     ]
 
 

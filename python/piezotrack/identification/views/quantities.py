@@ -177,7 +177,7 @@ def predicted(model: IdentifiedModel) -> list[Row]:
     within = f"within {length_text(covariance.predicted, 3)} (95 %) on another cycle like these"
     if (shares := covariance.shares) is None:
         return [("predicted", within)]
-    noise = f"noise {length_text(shares.noise, 3)}"
+    noise = f"part that does not repeat {length_text(shares.noise, 3)}"
     repeats = f"repeatable error {length_text(shares.model_error, 3)}"
     model_limits = shares.model_error > shares.noise
     limit = f"the model: {repeats}; {noise}" if model_limits else f"the sensor: {noise}; {repeats}"

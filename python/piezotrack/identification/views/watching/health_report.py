@@ -56,12 +56,15 @@ def health_text(health: Health) -> str:
     refit = health.refit
     if refit is not None:
         low, high = (100.0 * end for end in refit.interval)
+        gain, change = 100.0 * refit.improvement, "lower"
+        if gain < 0.0:
+            gain, low, high, change = -gain, -high, -low, "higher"
         lines += [
             "",
             f"refit {'accepted' if refit.accepted else 'not accepted'}: rms from "
             f"{length_text(refit.rms_before, 3)} to {length_text(refit.rms_after, 3)} where not "
             f"fitted ({refit.held_out[0]:.4g} to {refit.held_out[1]:.4g} s), mean square "
-            f"{100.0 * refit.improvement:.3g} % less ({low:.3g} to {high:.3g} %)",
+            f"{gain:.3g} % {change} ({low:.3g} to {high:.3g} %)",
         ]
     return "\n".join(lines)
 
