@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from piezotrack.data.checks.drive_features import time_features
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -342,3 +343,10 @@ def test_the_lower_rate_is_not_called_enough_for_a_mode_above_it(tmp_path: Path)
         assert ("mode up to 450 Hz" in determined(report)) == mode
         assert report.notes[0].startswith("1 kHz for a 1 Hz drive: 200 Hz are enough")
         assert report.notes[0].endswith("; not for a mode above 90 Hz") == mode
+
+
+def test_the_rate_of_times_rounded_to_microseconds_is_that_of_the_log() -> None:
+    t = np.round(np.arange(3000) / 6400.0, 6)
+    assert 1.0 / time_features(t).interval == pytest.approx(6400.0, rel=1e-6)
+    lost = np.delete(t, slice(1000, 1010))
+    assert 1.0 / time_features(lost).interval == pytest.approx(6400.0, rel=1e-4)

@@ -77,7 +77,7 @@ class TimeFeatures:
     begin, end : float
         Times of the first and the last one [s].
     interval : float
-        Median sampling interval [s].
+        Mean sampling interval without gaps [s].
     jitter : float
         Root mean square of the departure of the intervals from it, without gaps [s].
     gaps : tuple of (float, float, int)
@@ -163,9 +163,11 @@ def time_features(t: Array) -> TimeFeatures:
         for k in np.flatnonzero(far)
         if typical > 0.0
     )
-    jitter = float(np.sqrt(np.mean((near - typical) ** 2))) if near.size else 0.0
+    # Of rounded times the median is that of the rounding.
+    interval = float(np.mean(near)) if near.size else typical
+    jitter = float(np.std(near)) if near.size else 0.0
     backward = int(np.sum(intervals <= 0.0))
-    return TimeFeatures(t.size, float(t[0]), float(t[-1]), typical, jitter, gaps, backward)
+    return TimeFeatures(t.size, float(t[0]), float(t[-1]), interval, jitter, gaps, backward)
 
 
 def _missing(intervals: float) -> int:
