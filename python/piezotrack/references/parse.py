@@ -126,6 +126,8 @@ MISSING = {"low": "range", "start": "range", "start_frequency": "frequencies"}
 
 # Written so that each letter has one meaning: the time is linear in the length of a text.
 _VALUE = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d_]*)")
+# A range written with a dash.
+_RANGE = re.compile(r"\s*\d+(?:\.\d*)?\s*-\s*\d")
 # Longest text: more than the longest path of a file.
 MOST_LETTERS = 10_000
 
@@ -262,8 +264,10 @@ def made_from_text(
         values = {**others, **_values(kind, rest)}
         if duration is not None:
             values.setdefault("duration", duration)
-        elif kind.make in (sine, triangle) and values.get("frequency", 0.0) > 0.0:
-            values.setdefault("duration", PERIODS / values["frequency"])
+        elif kind.make in (sine, triangle) and "frequency" in values:
+            # One that is not above 0 is refused as such.
+            frequency = values["frequency"]
+            values.setdefault("duration", PERIODS / frequency if frequency > 0.0 else PERIODS)
         if missing := [argument for argument in kind.needed if argument not in values]:
             called = MISSING.get(missing[0], missing[0])
             raise ParameterError(f"there is no {called}: {kind.expected}")
@@ -292,6 +296,10 @@ def _values(kind: Kind, text: str) -> dict[str, Any]:
         if names is None:
             problem = "has no unit" if quantity == "number" else "has no place here"
             raise ParameterError(f"{quoted(item)} {problem}: {kind.expected}")
+        if names == ("low", "high") and numbers[0] > numbers[1]:
+            raise ParameterError(
+                quoted(item), "the upper end first", "the lower one, as in 5..40um", verb="has"
+            )
         for name, number in zip(names, [numbers] if names[0] in LISTS else numbers, strict=True):
             if name in values:
                 raise ParameterError(f"{quoted(item)} gives {name} a second time: {kind.expected}")
@@ -308,8 +316,9 @@ def numbers_with_unit(text: str) -> tuple[list[float], str, str]:
     for part in text.split(join) if join else [text]:
         match = _VALUE.fullmatch(part.strip())
         if match is None:
+            hint = "; a range has two dots, as in 0..110um" if _RANGE.match(part) else ""
             raise ParameterError(
-                f"{quoted(part.strip())} in {quoted(text)} is not a number with its unit"
+                f"{quoted(part.strip())} in {quoted(text)} is not a number with its unit{hint}"
             )
         values.append((float(match[1]), match[2]))
     if join == ".." and len(values) != 2:
