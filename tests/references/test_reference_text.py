@@ -156,7 +156,7 @@ BAD_TEXTS = {
     "sine:0.2Hz,low..9um": "'low' in 'low..9um' is not a number",
     "sine:0.2Hz,0..110um,wobble=3s": "'wobble' is not one of phase, ramp",
     "sine:0.2Hz,0..110um,ramp=3": "'ramp=3' has the wrong unit: expected time, unit s, ms",
-    "sine:0.2Hz,110..0um": "'110..0um' has the upper end first: expected the lower one",
+    "sine:0.2Hz,110..0um": "low is 0.00011: expected less than high",
     "sine:0Hz,0..110um": "frequency is 0: expected a finite number above 0",
     "sine:1Hz,5-40um": "a range has two dots, as in",
     "sine:nanHz,0..110um": "not a number",

@@ -296,10 +296,6 @@ def _values(kind: Kind, text: str) -> dict[str, Any]:
         if names is None:
             problem = "has no unit" if quantity == "number" else "has no place here"
             raise ParameterError(f"{quoted(item)} {problem}: {kind.expected}")
-        if names == ("low", "high") and numbers[0] > numbers[1]:
-            raise ParameterError(
-                quoted(item), "the upper end first", "the lower one, as in 5..40um", verb="has"
-            )
         for name, number in zip(names, [numbers] if names[0] in LISTS else numbers, strict=True):
             if name in values:
                 raise ParameterError(f"{quoted(item)} gives {name} a second time: {kind.expected}")
