@@ -71,7 +71,7 @@ def test_no_motion_is_taken_for_a_glitch(drive: str, mechanics: str) -> None:
 def test_the_measured_logs_have_none(name: str) -> None:
     log = getattr(pt.datasets, name)()
     assert not log.far.any()
-    assert log.without_far_readings() is log
+    assert log.without_faulty_readings() is log
 
 
 @pytest.mark.parametrize("drive", ["sine", "square", "stairs", "triangle"])
@@ -104,8 +104,8 @@ def log_with(share: float) -> pt.Dataset:
 
 def test_more_than_one_in_a_hundred_are_not_left_out() -> None:
     few, many = log_with(0.005), log_with(0.02)
-    assert few.without_far_readings().left_out is not None
-    assert many.without_far_readings() is many
+    assert few.without_faulty_readings().left_out is not None
+    assert many.without_faulty_readings() is many
     (note,) = many.far_notes
     assert "none of these is" in note
     assert few.far.sum() == 25
@@ -113,12 +113,12 @@ def test_more_than_one_in_a_hundred_are_not_left_out() -> None:
 
 def test_what_is_left_out_is_not_in_stroke_and_stays_in_the_record() -> None:
     log = log_with(0.005)
-    clean = log.without_far_readings()
+    clean = log.without_faulty_readings()
     assert clean.stroke == pytest.approx(STROKE, rel=2e-3)
     assert log.stroke > 1.1 * STROKE
     assert np.array_equal(clean.recorded, log.y)
     assert clean.sha256 == log.sha256
-    assert clean.without_far_readings() is clean
+    assert clean.without_faulty_readings() is clean
     part = clean[1.0:2.0]
     assert part.left_out is not None
     assert part.left_out.sum() == part.far.sum() == log[1.0:2.0].far.sum()

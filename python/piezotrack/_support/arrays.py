@@ -23,6 +23,7 @@ __all__ = [
     "check_dt",
     "real",
     "real_array",
+    "runs",
     "signal_of",
     "time_axis",
     "time_fault",
@@ -44,6 +45,12 @@ USE_DT = (
 # Largest departure of the times of an evenly sampled record from a straight line, in its
 # intervals: jitter does not add up, other intervals do.
 JITTER = 1.0
+
+
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return the first sample, and that after the last, of each run of true entries."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def check_dt(dt: float, name: str = "dt") -> float:

@@ -23,6 +23,7 @@ from .dataset_arguments import (
 )
 from .far_readings import are_few, bridged, far_notes, far_readings
 from .missing import USE_MISSING, checked_missing, complete, thinned
+from .sensor_end import end_mask, end_note, sensor_ends
 
 if TYPE_CHECKING:
     import os
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 
     from .frames import Frame
     from .missing import Missing
+    from .sensor_end import SensorEnd
 
     Array = NDArray[np.float64]
     Mask = NDArray[np.bool_]
@@ -157,6 +159,7 @@ class Dataset(Viewed):
         self._start, self._zero = 0, 0.0
         self._sha256: str | None = None
         self._far: Mask | None = None
+        self._at_end: Mask | None = None
         # Samples that `interpolate` put between the measured ones, and the interval of these.
         self._inserted: Mask | None = None
         self._measured_dt: float | None = None
@@ -373,6 +376,42 @@ class Dataset(Viewed):
         """A sentence on the single readings far off that are in the window; none without any."""
         return far_notes(self.t, self.recorded, self.far)
 
+    @property
+    def at_end(self) -> Mask:
+        """Readings in the window where the sensor or the stage is at its end, shape (n,).
+
+        None where they would be more than half of the record.
+        """
+        return self._at_end_of_all[self._start :]
+
+    @property
+    def _at_end_of_all(self) -> Mask:
+        """Readings at an end, those of the warm-up too."""
+        if self._at_end is None:
+            kept = slice(None) if self._inserted is None else ~self._inserted
+            u, y = self._u[kept], self._without_single_ones[kept]
+            self._at_end = np.zeros(self._u.size, dtype=np.bool_)
+            self._at_end[kept] = end_mask(sensor_ends(u, y), y.size)
+        return self._at_end
+
+    @property
+    def _without_single_ones(self) -> Array:
+        """Displacement as it was read, with straight lines where it is missing or far off."""
+        read = self._y if self._recorded is None else self._recorded
+        return bridged(read, np.isnan(read) | self._far_of_all)
+
+    @property
+    def ends(self) -> list[SensorEnd]:
+        """Ends of the sensor or of the stage that the window shows."""
+        return sensor_ends(self.u, self._without_single_ones[self._start :])
+
+    @property
+    def faulty_notes(self) -> list[str]:
+        """A sentence on single readings far off, and on each end; none of a sound window."""
+        left_out = bool(self.at_end.any())
+        notes = [end_note(end, self._drive_unit, left_out=left_out) for end in self.ends]
+        return [*self.far_notes, *notes]
+
     def counted(self, values: Array) -> Array:
         """Return the entries of values in the window at the samples that count.
 
@@ -388,14 +427,17 @@ class Dataset(Viewed):
         """
         return values if self._left_out is None else values[~self._left_out[self._start :]]
 
-    def without_far_readings(self) -> Dataset:
-        """Return the record without single readings far off, as `identify` and scores take it.
+    def without_faulty_readings(self) -> Dataset:
+        """Return the record without faulty readings, as `identify` and scores take it.
+
+        Single readings far off are left out, if they are not more than one in a hundred, and those
+        where the sensor or the stage is at its end: `far` and `at_end`.
 
         Returns
         -------
         Dataset
-            The record itself where there are none, or where they are more than one in a hundred.
-            Its `left_out` has them; `recorded` and `sha256` are those of before.
+            The record itself where there are none. Its `left_out` has them; `recorded` and
+            `sha256` are those of before.
 
         Examples
         --------
@@ -405,16 +447,17 @@ class Dataset(Viewed):
         >>> y = 20e-6 * u
         >>> y[471] += 30e-6
         >>> log = pt.Dataset(u=u, y=y, dt=0.001)
-        >>> f"{log.stroke * 1e6:.0f} um, {log.without_far_readings().stroke * 1e6:.0f} um"
+        >>> f"{log.stroke * 1e6:.0f} um, {log.without_faulty_readings().stroke * 1e6:.0f} um"
         '70 um, 40 um'
         """
-        left_out, far = self.left_out, self.far
-        if not far.any() or not are_few(far) or (left_out is not None and left_out[far].all()):
+        faulty = self.at_end | self.far if are_few(self.far) else self.at_end
+        left_out = self.left_out
+        if not faulty.any() or (left_out is not None and left_out[faulty].all()):
             return self
         part = self._part(0, self._u.size, start=self._start)
         # Those of the warm-up, which does not count, have no effect.
-        apart = self._far_of_all
-        mask = apart if self._left_out is None else self._left_out | apart
+        mask = self._at_end_of_all | self._far_of_all if are_few(self.far) else self._at_end_of_all
+        mask = mask if self._left_out is None else self._left_out | mask
         part._recorded = self._y if self._recorded is None else self._recorded
         part._y, part._left_out = signal_of("y", bridged(self._y, mask)), mask
         return part
@@ -569,11 +612,11 @@ class Dataset(Viewed):
 
         factor = decimation_factor(factor, len(self))
         first = self._start % factor
-        whole = self.without_far_readings()
+        whole = self.without_faulty_readings()
         less = whole._resampled(*at_lower_rate(self._t, factor, first))
         if whole is not self:
-            less._notes += tuple(self.far_notes)
-        less._left_out = thinned(self._left_out, factor, first)
+            less._notes += tuple(self.faulty_notes)
+        less._left_out = thinned(whole._left_out, factor, first)
         less._inserted = thinned(self._inserted, factor, first)
         less._measured_dt = None if less._inserted is None else self._measured_dt
         return less._part(0, len(less), start=self._start // factor)
@@ -621,10 +664,10 @@ class Dataset(Viewed):
         from .rates import at_higher_rate
 
         factor = interpolation_factor(factor, self._t.size, self._hold)
-        whole = self.without_far_readings()
+        whole = self.without_faulty_readings()
         fine = whole._resampled(*at_higher_rate(self._t, self._dt, factor))
         if whole is not self:
-            fine._notes += tuple(self.far_notes)
+            fine._notes += tuple(self.faulty_notes)
         fine._inserted = np.ones(fine._u.size, dtype=np.bool_)
         fine._inserted[::factor] = False if self._inserted is None else self._inserted
         fine._left_out = fine._inserted.copy()
@@ -717,7 +760,7 @@ class Dataset(Viewed):
 
     def _select(self, kept: slice | Mask) -> None:
         """Keep some of the samples of a new record."""
-        for name in ("_t", "_u", "_y", "_recorded", "_left_out", "_far", "_inserted"):
+        for name in ("_t", "_u", "_y", "_recorded", "_left_out", "_far", "_at_end", "_inserted"):
             values = getattr(self, name)
             setattr(self, name, None if values is None else values[kept])
         self._columns = {name: a[kept] for name, a in self._columns.items()}

@@ -83,10 +83,11 @@ def identify(
     ----------
     data : Dataset, Record or sequence of these
         The record. ``log[3.0:23.0]`` counts this window only and keeps the drive before it as
-        warm-up. Single readings far off are left out (`Dataset.without_far_readings`), and so are
-        missing ones (``pt.read(..., missing="drop")``). A drive that is fast for its sampling rate
-        is interpolated where that lowers the cost by 2 % (`Identification.interpolation`). Or
-        several records, in a list, whose drives have one unit. A `Record` has an offset, a delay, a
+        warm-up. Single readings far off and those where the sensor is at its end are left out
+        (`Dataset.without_faulty_readings`), and so are missing ones
+        (``pt.read(..., missing="drop")``). A drive that is fast for its sampling rate is
+        interpolated where that lowers the cost by 2 % (`Identification.interpolation`). Or several
+        records, in a list, whose drives have one unit. A `Record` has an offset, a delay, a
         drift, a history and a weight of its own, in place of the arguments below.
         `Identification.records` has what was found of each alone.
     model : str, optional

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..._support.arrays import runs
 from ..._support.units import best_length_unit, length_text, lookup, shown_unit
 from ...data import datasets
-from ...data.checks.diagnostics import runs
 from ...data.checks.log_info import info
 from ...data.reader import read
 from ...errors import DataError, PiezotrackError

@@ -26,7 +26,6 @@ __all__ = [
     "fit_warnings",
     "has_steps",
     "jumps",
-    "runs",
     "turns",
 ]
 
@@ -183,12 +182,6 @@ def has_steps(u: Array) -> bool:
 def jumps(u: Array) -> bool:
     """Return whether a drive jumps by a fifth of its range or more from sample to sample."""
     return bool(float(np.abs(np.diff(u)).max()) >= JUMP * np.ptp(u))
-
-
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first sample, and that after the last, of each run of true entries."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _drive(data: Dataset, value: float, digits: int = 4) -> str:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from ..._support.arrays import MOST_SAMPLES
+from ..._support.arrays import MOST_SAMPLES, runs
 from ..._support.statistics import sample_noise
 from ..._support.units import drive_text
-from .diagnostics import jumps, runs, turns
+from .diagnostics import jumps, turns
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from ..._support.arrays import runs
 from ..._support.units import drive_text, length_text
+from ..sensor_end import end_note
 from .connections import unusual_connection
-from .diagnostics import TURN, has_steps, runs, turns
+from .diagnostics import has_steps, turns
 from .hum import hum_notes, quick_part
 
 if TYPE_CHECKING:
@@ -90,7 +92,7 @@ def record_flags(data: Dataset) -> list[RecordFlag]:
     >>> flag.kind, flag.spans
     ('jump', ((2.5, 2.501),))
     """
-    whole = data.measured.without_far_readings()
+    whole = data.measured.without_faulty_readings()
     quick = quick_part(whole.u, whole.y, whole.dt)
     notes = hum_notes(quick.hum, "in the displacement")
     hum = [RecordFlag("hum", note, quick=quick) for note in notes]
@@ -104,7 +106,7 @@ def _flags(data: Dataset) -> list[RecordFlag]:
         return flags
     far = tuple((float(data.t[k]), float(data.t[k])) for k in np.flatnonzero(data.far))
     flags += [RecordFlag("far", note, far) for note in data.far_notes]
-    whole = data.without_far_readings()
+    whole = data.without_faulty_readings()
     jumps = [*_jumps(whole)]
     # A displacement that jumps lags or leads by chance.
     connection = None if jumps else unusual_connection(whole.u, whole.y)
@@ -116,7 +118,7 @@ def _flags(data: Dataset) -> list[RecordFlag]:
     units = [*_units(whole), *_seldom(data)]
     flags += [RecordFlag("unit", note) for note in units]
     flags += [RecordFlag("period", note) for note in _periods(whole)]
-    return [*flags, *_clipping(whole), *_at_end(whole), *jumps]
+    return [*flags, *_clipping(whole), *_at_end(data), *jumps]
 
 
 def record_warnings(data: Dataset) -> list[str]:
@@ -246,24 +248,11 @@ def _clipping(data: Dataset) -> Iterator[RecordFlag]:
 
 
 def _at_end(data: Dataset) -> Iterator[RecordFlag]:
-    """Find where the sensor or the stage is at its end."""
-    u, y, swing = data.u, data.y, float(np.ptp(data.u))
-    for level in (float(y.max()), float(y.min())):
-        held, furthest = [], 0.0
-        for first, last in runs(np.abs(y - level) <= 1e-3 * data.stroke):
-            part = u[first:last]
-            ends = part[[0, -1]]
-            further = max(float(part.max() - ends.max()), float(ends.min() - part.min()))
-            if last - first >= 10 and further > TURN * swing:
-                held.append((first, last))
-                furthest = furthest or further
-        if held:
-            note = (
-                f"the displacement stays at {length_text(level)} while the drive goes "
-                f"{_drive(data, furthest, 3)} further and back: is the sensor or the "
-                "stage at its end?"
-            )
-            yield RecordFlag("end", note, _at_times(data, held))
+    """Say where the sensor or the stage is at its end."""
+    left_out = bool(data.at_end.any())
+    for end in data.ends:
+        note = end_note(end, data.drive_unit, left_out=left_out)
+        yield RecordFlag("end", note, _at_times(data, end.spans))
 
 
 def _cut_off(moves: Array, first: int, last: int, quick: float, swing: float) -> bool:

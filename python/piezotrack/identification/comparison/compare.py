@@ -282,7 +282,7 @@ def compare(
     expect("data", data, Dataset, "a Dataset, see pt.read")
     wanted = _wanted(models, data.drive_unit)
     first, second, carried = parts_of(data, train, test)
-    first, second = first.without_far_readings(), second.without_far_readings()
+    first, second = first.without_faulty_readings(), second.without_faulty_readings()
     method = (Descents(seed=seed, runs=runs), LeastSquares())
     rows = []
     # About how long each takes.

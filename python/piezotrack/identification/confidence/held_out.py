@@ -211,7 +211,7 @@ class _Record:
         weight: float,
         linear: Sensitivity | None,
     ) -> None:
-        data = data.without_far_readings()
+        data = data.without_faulty_readings()
         self.rate = np.abs(data.counted(np.gradient(data.u, data.dt)))
         self.amplitude = data.counted(amplitudes(data.u))
         # From every second turn of the drive to the next.

@@ -162,7 +162,7 @@ def _of_drive(model: IdentifiedModel, u: ArrayLike, dt: float | None) -> _Motion
 
 def _of_record(model: IdentifiedModel, data: Dataset, linear: Sensitivity) -> _Motion:
     """Motion on a record, whose offset and drift follow from its readings."""
-    data = data.without_far_readings()
+    data = data.without_faulty_readings()
     basis = linear.nuisance.T
     columns = linear.columns.T
     columns = columns - basis @ np.linalg.lstsq(basis, columns, rcond=1e-12)[0]

@@ -385,7 +385,7 @@ class LinearisedRecord:
     """
 
     def __init__(self, model: IdentifiedModel, data: Dataset) -> None:
-        self.model, self.data = model, data.without_far_readings()
+        self.model, self.data = model, data.without_faulty_readings()
         self.start = model.start_on(self.data)
         known: list[Any] = [model, *model.records]
         mine = [one for one in known if same_beginning(one.start, self.data)]

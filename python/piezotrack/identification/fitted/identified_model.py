@@ -363,7 +363,7 @@ class IdentifiedModel(ModelViews):
             stage's own. The delay is that of the record where it is one of those identified.
         """
         expect("data", data, Dataset, "a Dataset")
-        data = data.without_far_readings()
+        data = data.without_faulty_readings()
         run = self._run(data, history, initial)
         drift, shift = self._added(data, run.x, offset)
         return replace(run, x=run.x + drift + shift)
@@ -439,7 +439,7 @@ class IdentifiedModel(ModelViews):
             own, of another record to the largest.
         """
         expect("data", data, Dataset, "a Dataset")
-        data = data.without_far_readings()
+        data = data.without_faulty_readings()
         x = self._run(data, history, initial).x
         drift, shift = self._added(data, x, offset)
         error = data.counted(data.y - x - drift - shift)
@@ -450,7 +450,7 @@ class IdentifiedModel(ModelViews):
             stroke=self.stroke if record is None else record.stroke,
             offset=shift,
             spread=float(np.std(data.counted(data.y))),
-            notes=(*self.extrapolation_notes(data.u, data.dt), *data.far_notes),
+            notes=(*self.extrapolation_notes(data.u, data.dt), *data.faulty_notes),
             max_error_time=float(data.counted(data.t)[largest]),
             fitted_share=self._fitted_share(data),
         )
@@ -485,7 +485,7 @@ class IdentifiedModel(ModelViews):
             Its `state` is in equilibrium under the first sample of the drive.
         """
         expect("data", data, Dataset, "a Dataset")
-        data = data.without_far_readings()
+        data = data.without_faulty_readings()
         history = checked_history(history)
         own = self._own(data)
         known = self.start if own is None else own.start

@@ -148,7 +148,7 @@ def records_of(
         entry if isinstance(entry, Record) else Record(entry, **values)  # type: ignore[arg-type]
         for entry in given
     )
-    records = tuple(_without_far_readings(one) for one in records)
+    records = tuple(_without_faulty_readings(one) for one in records)
     datasets = [one.data for one in records]
     for i, dataset in enumerate(datasets):
         if dataset.drive_unit != datasets[0].drive_unit:
@@ -161,9 +161,9 @@ def records_of(
     return records
 
 
-def _without_far_readings(record: Record) -> Record:
+def _without_faulty_readings(record: Record) -> Record:
     """Leave single readings far off out of a record; the same record where there are none."""
-    data = record.data.without_far_readings()
+    data = record.data.without_faulty_readings()
     return record if data is record.data else replace(record, data=data)
 
 

@@ -378,7 +378,7 @@ def what_was_fitted(fit: Identification, fitted: FittedRecord | None = None) -> 
 
 def what_was_shown(model: IdentifiedModel, record: Dataset, run: Response) -> str:
     """Write model, record, window and error on any record, as the title of its pictures."""
-    data = record.without_far_readings()
+    data = record.without_faulty_readings()
     rms = 100.0 * float(np.sqrt(np.mean(data.counted(data.y - run.x) ** 2))) / model.stroke
     share = model._fitted_share(data)
     fitted = "" if share == 1.0 else f", {share_fitted(share)}"

@@ -54,7 +54,7 @@ def refitted(
     """
     split = float(record.t[0] + FITTED * (record.t[-1] - record.t[0]))
     arguments, name = _arguments(model), model.model.info.name
-    held = record[split:].without_far_readings()
+    held = record[split:].without_faulty_readings()
     fresh = identify(record[:split], name, **arguments)
     states = (start.state, fresh.start_on(record).state)
     pairs = zip((model, fresh), states, strict=True)

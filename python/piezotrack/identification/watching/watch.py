@@ -86,7 +86,7 @@ def watch(model: IdentifiedModel, record: Dataset, *, refit: bool = False) -> He
     expect("record", record, Dataset, "a Dataset")
     known = Known.of(model)
     _check(model, record, known)
-    judgement = Judgement(model, record.without_far_readings(), known)
+    judgement = Judgement(model, record.without_faulty_readings(), known)
     changes = judgement.changes()
     return Health(
         model=model.model.info.title,
