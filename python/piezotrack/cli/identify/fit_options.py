@@ -194,7 +194,11 @@ class RecordOptions:
 
     offset: Annotated[bool, Option("Fit a constant sensor offset; default yes")] = True
     sensor_delay: Annotated[
-        list[str] | None, Option("Delay of the sensor; default none", metavar="fit|TIME|LOW:HIGH")
+        list[str] | None,
+        Option(
+            "Delay of the sensor; default none if searched, else by the log",
+            metavar="none|fit|TIME|LOW:HIGH",
+        ),
     ] = None
     drift: Annotated[
         list[str] | None,
@@ -395,12 +399,12 @@ def _check_count(option: str, given: Sequence[object] | None, count: int) -> Non
 
 def delay_asked(text: str | None) -> bool | float | tuple[float, float] | None:
     """Parse the delay of a log [s]."""
-    if text is None or text == "fit":
-        return None if text is None else True
+    if text is None or text in ("none", "fit"):
+        return None if text is None else text == "fit"
     if ":" in text:
         low, high = Ranged(LOOP_TIME, "LOW:HIGH").parse("--sensor-delay", text)
         return low or 0.0, high or 0.0
-    return _time("--sensor-delay", text, "fit, a time as 2ms, or bounds as 0:5ms")
+    return _time("--sensor-delay", text, "none, fit, a time as 2ms, or bounds as 0:5ms")
 
 
 def drift_asked(text: str) -> bool | float:

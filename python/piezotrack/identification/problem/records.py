@@ -39,8 +39,8 @@ class Record:
     offset : bool, optional
         Whether a constant offset of the displacement is fitted too.
     delay : bool, float or (float, float), optional
-        Delay of the displacement with respect to the drive [s]: none (False, the default), fitted
-        (True), known (a number), or fitted between two bounds.
+        Delay of the displacement with respect to the drive [s]: none (False), fitted (True), known
+        (a number), or fitted between two bounds; see `identify` for where it is not given.
     drift : bool or float, optional
         Slow drift of the sensor along the record: none (False), with a time constant that the
         record shows (True), or with this one [s]; see `identify` for where it is not given.

@@ -15,6 +15,7 @@ from .earlier_motion import earlier_motion, refined_cost
 from .jump import with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
+from .variants.delay import with_delay_tried
 from .variants.exponent import with_exponent_tried
 from .weights import solve_least_squares
 
@@ -60,13 +61,16 @@ def identify_model(
         As for `identify`.
     """
 
-    def identify(other: Problem) -> Identification:
-        return _identify(other, method, run, start)
+    def identify(other: Problem, start: Structure | None) -> Identification:
+        def plain(one: Problem) -> Identification:
+            return _identify(one, method, run, start)
 
-    if any(record.history == "rest" for record in problem.records):
-        return with_rest(problem, identify)
-    fit = identify(problem)
-    return with_rest_tried(problem, fit, identify) if len(problem.records) == 1 else fit
+        if any(record.history == "rest" for record in other.records):
+            return with_rest(other, plain)
+        fit = plain(other)
+        return with_rest_tried(other, fit, plain) if len(other.records) == 1 else fit
+
+    return with_delay_tried(problem, method, start, identify)
 
 
 def _identify(

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from ..fitted.identification import Identification
     from ..methods.choice import MethodChoice
     from ..problem.problem import Problem
+    from ..problem.records import Record
     from .run import Run
 
     Array = NDArray[np.float64]
@@ -172,8 +173,11 @@ class _Trials:
         except (DataError, NumericalError) as error:
             self.refused = self.refused or error
             return False
-        if isinstance(method, LeastSquares):
-            self.start = self.start or Structure.of(fit)
+        if isinstance(method, LeastSquares) and self.start is None:
+            self.start = Structure.of(fit)
+            # The first model decides whether others have a delay.
+            shown = [record.delay != 0.0 for record in fit.records]
+            self.problem = replace(self.problem, records=_with_delays(self.problem.records, shown))
         records = self.problem.records
         counts = np.array(
             [one.weight * len(rest) for one, rest in zip(records, self.rests, strict=True)]
@@ -192,6 +196,12 @@ class _Trials:
         plain = np.array([math.sqrt(float(np.mean(one**2))) for one in counted])
         self.least = min(self.least, float(np.max(plain / np.maximum(noise, 1e-300))))
         return bool(np.all(plain < AS_NOISE * noise)) and all(is_white(one) for one in counted)
+
+
+def _with_delays(records: tuple[Record, ...], shown: list[bool]) -> tuple[Record, ...]:
+    """Fit a delay where nothing is given and one is shown, and none elsewhere."""
+    both = zip(records, shown, strict=True)
+    return tuple(replace(one, delay=delayed) if one.delay is None else one for one, delayed in both)
 
 
 def noise_of(data: Dataset) -> float:

@@ -101,9 +101,4 @@ impl<'a> WeightsRecord<'a> {
     pub(super) fn length(&self) -> f64 {
         self.drive.dt * index(self.samples())
     }
-
-    /// Whether readings are late.
-    pub(super) fn is_delayed(&self) -> bool {
-        self.delay != WeightsDelay::Known(0.0)
-    }
 }

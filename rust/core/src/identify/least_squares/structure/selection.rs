@@ -52,7 +52,7 @@ pub(in crate::identify::least_squares) fn search<'a>(
     let rows = rows_of(common);
     let thin = |one: &WeightsRecord<'_>| {
         let every = thinning(&one.measures(), one.drive.dt, one.samples(), rows);
-        Thinned::of(&one.drive, one.y, one.left_out, if one.is_delayed() { 1 } else { every })
+        Thinned::of(&one.drive, one.y, one.left_out, every)
     };
     let kept: Vec<Thinned> = common.records.iter().map(thin).collect();
     let few = common.thinned(&kept);
