@@ -105,6 +105,16 @@ def test_margins_alone_give_gains_without_a_reference() -> None:
 
 
 @pytest.mark.usefixtures("_no_pictures")
+def test_the_gains_are_printed_as_options_of_track() -> None:
+    printed = ran("tune", "dahl.json", *QUICK)
+    (gains,) = re.findall(r"--kp .*", printed)
+    with_file = ran("track", "results/controller.json", *COURSE, "--json", "--out", "file")
+    by_options = ran("track", "dahl.json", *COURSE, *QUICK[:2], *gains.split(), "--json")
+    errors = [json.loads(one)["metrics"]["rms_error"] for one in (with_file, by_options)]
+    assert errors[1] == pytest.approx(errors[0], rel=1e-3)
+
+
+@pytest.mark.usefixtures("_no_pictures")
 def test_the_margins_are_those_of_python_by_default_and_in_rad() -> None:
     def bounds(*options: str) -> dict[str, float]:
         found = parsed(ran("tune", "dahl.json", *QUICK, "--json", "--overwrite", *options))

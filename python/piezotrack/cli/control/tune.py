@@ -13,7 +13,15 @@ from ..options import Sensitivity, Zero
 from ..output import Output
 from ..values import ANGLE, DECIBELS, LENGTH, LOOP_TIME, PERCENT
 from .controller_files import response_in
-from .loop_options import PAPER, LoopOptions, Simulation, Stage, known_model, zero_words
+from .loop_options import (
+    PAPER,
+    LoopOptions,
+    Simulation,
+    Stage,
+    gains_as_options,
+    known_model,
+    zero_words,
+)
 
 __all__ = ["tune_command"]
 
@@ -136,6 +144,11 @@ def tune_command(
         search=TuningSearch(seed=simulation.seed),
     )
     words = f"stage: {stage or model.name}{zeroed}\n{tuned}"
+    if gains := gains_as_options(tuned.controller):
+        made = tuned.controller
+        others = ", without filters" if made.filters else ""
+        others += ", without the repetitive part" if made.repetitive is not None else ""
+        words += f"\nas options of `track`{others}: {gains}"
     output.show(words, tuned.document(), output.write(tuned.save, "controller.json"))
 
 
