@@ -104,6 +104,35 @@ def test_a_repetitive_part_is_tuned_where_the_reference_repeats() -> None:
     assert {one.name for one in tuned.kept} >= {"learning"}
 
 
+# Each begins with a cutoff above half the sampling rate, the one near it, the other far.
+NEAR_AND_FAR = {
+    "near": (pt.DahlStage.xu_li_2010(), 2e-3, 1.2e-3),
+    "far": (
+        pt.PrandtlIshlinskiiStage(
+            linear=1e-6,
+            thresholds=(5.0, 10.0),
+            weights=(2e-7, 1e-7),
+            frequency=30.0,
+            damping_ratio=1.2,
+        ),
+        1e-2,
+        6e-3,
+    ),
+}
+
+
+@pytest.mark.parametrize("which", NEAR_AND_FAR)
+def test_no_low_pass_is_faster_than_half_the_sampling_rate(which: str) -> None:
+    stage, dt, delay = NEAR_AND_FAR[which]
+    known: dict[str, Any] = {"dt": dt, "limits": LIMITS, "timing": pt.Timing(delay=delay)}
+    tuned = pt.tune(stage, parts=("pid", "low-pass"), **known)
+    assert all(one.cutoff <= 0.5 / dt for one in tuned.controller.filters)  # type: ignore[attr-defined]
+    report = pt.check_loop(stage, tuned.controller, delay=delay)
+    assert all(one.sensitivity <= 2.0 * 1.01 for _, one in report.cases)
+    # The search may do without it.
+    assert tuned.value <= 1.01 * pt.tune(stage, parts="pid", **known).value
+
+
 def test_the_fastest_of_the_allowed_sampling_rates_wins_on_a_clean_stage() -> None:
     stage = replace(published_stage(), sensor=pt.stages.Sensor())
     tuned = pt.tune(stage, motion(10.0), dt=(0.02, 0.005), limits=LIMITS, parts="pid", **QUICK)
