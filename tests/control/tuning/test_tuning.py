@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import signal
 import threading
 import time
@@ -69,6 +70,20 @@ def test_the_report_is_that_of_the_exact_check_and_of_a_full_simulation() -> Non
     kept = {one.name: one for one in tuned.kept}
     assert kept["sensitivity"].value == pytest.approx(worst)
     assert "active constraints" in str(tuned)
+
+
+@pytest.mark.parametrize(("high", "clipped"), [(80e-6, True), (40e-6, False)])
+def test_the_report_says_how_long_the_drive_is_at_its_limits(high: float, clipped: bool) -> None:
+    """1 um/V and 75 V: 80 um are beyond reach."""
+    stage = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(), weights=())
+    line = pt.triangle(frequency=1.0, low=20e-6, high=high, duration=2.0)
+    goal = pt.Goal(largest_saturation=0.9)
+    brief = pt.TuningSearch(particles=8, iterations=4)
+    tuned = pt.tune(stage, line, dt=0.02, limits=LIMITS, parts="pid", goal=goal, search=brief)
+    shares = [float(one) for one in re.findall(r"clipped in ([\d.]+) %", tuned.summary())]
+    share = 100.0 * tuned.runs[0].saturated.mean()
+    assert shares == ([pytest.approx(share, abs=0.06)] if clipped else [])
+    assert (share > 1.0) == clipped
 
 
 @pytest.mark.slow
