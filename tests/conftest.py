@@ -45,6 +45,7 @@ def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
         import_module(f"piezotrack.{name}")
         for name in (
             "_support.files.writing",
+            "control.tuning.tuned",
             "identification.comparison.compare",
             "identification.experiments.sensor_noise",
             "identification.experiments.step_response",

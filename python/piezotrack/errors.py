@@ -156,8 +156,9 @@ class Interrupted(KeyboardInterrupt):
 
     Attributes
     ----------
-    partial : piezotrack.Identification, Tracking or Learning, or None
-        The best result up to then, the run or what was learnt; None where there is nothing yet.
+    partial : piezotrack.Identification, Comparison, Tracking or Learning, or None
+        The best result up to then, the models compared, the run or what was learnt; None where
+        there is nothing yet.
     """
 
     def __init__(self, message: str = "interrupted", partial: Any = None) -> None:

@@ -67,6 +67,7 @@ WRONG: list[tuple[str, dict[str, Any], str, str]] = [
     ("motion", {"kind": "file"}, "motion", "no file yet"),
     ("loop", {"kp": 1e12}, "kp", "kp is 1e+12"),
     ("loop", {"notch": 1e5}, "notch", "half the sampling rate"),
+    ("loop", {"low_pass": 1e5}, "low_pass", "half the sampling rate"),
     ("loop", {"delay": 10.0}, "delay", "delay is 10"),
     ("device", {"low": -10.0}, "low", "low is -10 V"),
     ("device", {"high": 1e6}, "high", "high is 1e+06 V"),

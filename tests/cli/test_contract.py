@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import click
@@ -83,7 +84,7 @@ TABLE = """
 --parquet         -                                         campaign.parquet
 --parts           NAMES                                     pid,low-pass,notch,repetitive
 --period          TIME                                      repeats
---phase-margin    DEGREES                                   Least phase margin
+--phase-margin    ANGLE                                     Least phase margin
 --plays           N                                         Play operators
 --port            N                                         TCP port
 --prefix          NAME                                      epics records
@@ -157,7 +158,7 @@ VALUES = {
     "GAIN": ("0.03V/um", 0.03, "0.03V"),
     "SLEW": ("2V/ms", 2000.0, "2V"),
     "DECIBELS": ("6dB", 6.0, "6deg"),
-    "DEGREES": ("30deg", 30.0, "30dB"),
+    "ANGLE": ("0.5rad", math.degrees(0.5), "30dB"),
     "PERCENT": ("5%", 5.0, "5dB"),
     "NUMBER": ("0.5", 0.5, "0.5s"),
 }
@@ -243,6 +244,12 @@ def test_what_may_be_meant_in_another_unit_needs_its_own() -> None:
     for option in ("--noise", "--largest-error"):
         with pytest.raises(pt.ParameterError, match="its unit, as 20nm"):
             by_name[option].type.convert("20", by_name[option], None)
+    phase = by_name["--phase-margin"]
+    for text, degrees in (("30", 30.0), ("30deg", 30.0), ("0.5deg", 0.5), ("0", 0.0)):
+        assert phase.type.convert(text, phase, None) == degrees
+    for text in ("0.5", "3.14"):
+        with pytest.raises(pt.ParameterError, match=r"its unit, as 30deg or 0\.5rad"):
+            phase.type.convert(text, phase, None)
     assert by_name["--noise"].type.convert("0", by_name["--noise"], None) == 0.0
 
 

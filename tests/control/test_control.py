@@ -333,6 +333,7 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
     "no filter": (lambda: loop(filters=[PID]), "filters"),
     "three filters": (lambda: loop(filters=[pt.LowPass(5.0)] * 3), "filters"),
     "cutoff": (lambda: pt.LowPass(0.0), "cutoff"),
+    "low-pass too fast": (lambda: loop(filters=[pt.LowPass(25.01)]), "cutoff"),
     "notch too fast": (lambda: loop(filters=[pt.Notch(25.0)]), "frequency"),
     "notch text": (lambda: pt.Notch("10"), "frequency"),  # type: ignore[arg-type]
     "notch width": (lambda: pt.Notch(10.0, 0.0), "width"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from math import degrees
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -22,8 +23,8 @@ else:
     ParamType = click.ParamType
 
 __all__ = [
+    "ANGLE",
     "DECIBELS",
-    "DEGREES",
     "DRIVE",
     "FREQUENCY",
     "GAIN",
@@ -82,8 +83,9 @@ class Quantity(ParamType):
         Quantity whose units are taken, as ``"time"``.
     bare : str
         Unit in which a number without one counts; empty where it has to have one.
-    most_bare : float
-        Number from which on one without a unit is refused, since it may be meant in another.
+    least_bare, most_bare : float
+        Numbers below the one, and from the other on, are refused without a unit, since they may be
+        meant in another.
     example : str
         For errors, as ``"20ms"``.
     """
@@ -93,6 +95,7 @@ class Quantity(ParamType):
     bare: str = ""
     units: dict[str, float] = field(default_factory=dict)
     quantity: str = ""
+    least_bare: float = 0.0
     most_bare: float = float("inf")
 
     def convert(
@@ -112,7 +115,7 @@ class Quantity(ParamType):
         if not unit:
             if number == 0.0 or number in (float("inf"), -float("inf")) or number != number:
                 return Number.of(number, "")
-            if not self.bare or number >= self.most_bare:
+            if not self.bare or number >= self.most_bare or abs(number) < self.least_bare:
                 raise ParameterError(option, f"'{text}'", f"its unit, {self.example}", verb="has")
             return Number.of(number, "")
         if unit in self.units:
@@ -142,7 +145,14 @@ GAIN = Quantity(
 )
 SLEW = Quantity("SLEW", "as 2000V/s", "V/s", {"V/s": 1.0, "V/ms": 1e3, "kV/s": 1e3})
 DECIBELS = Quantity("DECIBELS", "as 6dB", "dB", {"dB": 1.0})
-DEGREES = Quantity("DEGREES", "as 30deg", "deg", {"deg": 1.0, "\N{DEGREE SIGN}": 1.0})
+# A number up to pi may be in rad.
+ANGLE = Quantity(
+    "ANGLE",
+    "as 30deg or 0.5rad",
+    "deg",
+    {"deg": 1.0, "\N{DEGREE SIGN}": 1.0, "rad": degrees(1.0)},
+    least_bare=3.15,
+)
 # Its numbers have no unit, and the blank stands for that.
 PLAIN = Quantity("NUMBER", "as 0.5", " ")
 PERCENT = Quantity("PERCENT", "as 5%", "%", {"%": 1.0})

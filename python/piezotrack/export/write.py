@@ -116,6 +116,7 @@ def export_controller(
     reference: Reference | None = None,
     table: ArrayLike | None = None,
     clock: float | None = None,
+    beyond_reach: bool = False,
 ) -> Exported:
     """Write a controller for firmware or for another program.
 
@@ -152,6 +153,9 @@ def export_controller(
         Clock of the processor [Hz], of C99 and firmware: a step that could take longer than its
         interval is refused, at an instruction a cycle on a Cortex-M with a floating-point unit for
         its numbers.
+    beyond_reach : bool, optional
+        Whether `reference` may exceed the reach of the stage of the feedforward, as of `track`; its
+        table is clipped to the limits.
 
     Returns
     -------
@@ -161,7 +165,8 @@ def export_controller(
     Raises
     ------
     ParameterError
-        A part of the controller has no such form; the message names it. A unit is asked for
+        A part of the controller has no such form; the message names it. The reference exceeds the
+        reach of the stage. A unit is asked for
         where there is no C compiler, or not on Linux, x86-64.
     DataError
         A file cannot be written; `table` has a voltage that is not finite or beyond the limits.
@@ -183,7 +188,8 @@ def export_controller(
     if fixed and to not in ("c99", "firmware"):
         raise ParameterError("fixed", f"True with to={to!r}", "False, that is of C99 and firmware")
     names = export_files(to, name)
-    played = feedforward_table(controller, reference, table)
+    free = _core.as_truth("beyond_reach", beyond_reach)
+    played = feedforward_table(controller, reference, table, beyond_reach=free)
     note = _clipped(controller, played or [])
     if to == "json":
         if single:

@@ -54,20 +54,27 @@ def test_a_refused_export_leaves_no_folder() -> None:
     assert Path("c").is_dir()
 
 
-def test_a_table_beyond_the_limits_is_told() -> None:
-    """At 5 um the settled loop of this stage needs less than 0 V."""
+def test_a_motion_beyond_the_reach_is_refused_as_by_track() -> None:
+    """At 5 um the settled loop of this stage needs less than 5 V."""
     controller = save(feedforward=PLAYS.inverse(), limits=(5.0, 75.0))
-    low = ("sine:0.5Hz,5..60um,4s", "--to", "json", "--json", "--out")
-    note = json.loads(ran("export", "loop.json", *low, "low"))["note"]
-    reference = pt.sine(frequency=0.5, low=5e-6, high=60e-6, duration=4.0)
+    form = ("--to", "json", "--json", "--out")
     assert controller.feedforward is not None
+    for low, high in ((5, 60), (40, 200)):
+        motion = f"sine:0.5Hz,{low}..{high}um,4s"
+        with pytest.raises(pt.ParameterError) as track:
+            pt.track(PLAYS, controller, motion)
+        said = refusal("export", "loop.json", motion, *form, "no")
+        ends = str(track.value).replace("beyond_reach=True", "--beyond-reach")
+        assert said.split(" is ", 1)[1] == ends.split(" is ", 1)[1]
+        assert not Path("no").exists()
+    far = ("sine:0.5Hz,5..60um,4s", "--beyond-reach", *form)
+    note = json.loads(ran("export", "loop.json", *far, "far"))["note"]
+    reference = pt.sine(frequency=0.5, low=5e-6, high=60e-6, duration=4.0)
     table = controller.feedforward.table(reference, 0.02, limits=controller.limits)
-    assert table.min() < 5.0
-    assert f"goes from {table.min():.4g} to {table.max():.4g} V" in note
     assert f"5 to 75 V, in {np.sum(table < 5.0)} of {table.size} samples" in note
-    assert note in ran("export", "loop.json", *low[:3], "--out", "again")
-    high = ("sine:0.5Hz,40..60um,4s", *low[1:])
-    assert json.loads(ran("export", "loop.json", *high, "high"))["note"] == ""
+    near = ("sine:0.5Hz,40..60um,4s", *form)
+    assert json.loads(ran("export", "loop.json", *near, "near"))["note"] == ""
+    assert "no effect without REFERENCE" in refusal("export", "loop.json", "--beyond-reach")
 
 
 @needs_gcc

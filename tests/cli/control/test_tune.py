@@ -76,7 +76,7 @@ def test_what_is_written_is_a_loop_that_keeps_the_margins_and_the_error() -> Non
         assert margin.stable
         assert margin.sensitivity <= 2.0 * 1.01
         assert (margin.gain_margin or math.inf) >= 2.0 * 0.99
-        assert (margin.phase_margin or math.pi) >= math.radians(30.0) * 0.99
+        assert (margin.phase_margin or math.pi) >= 0.5 * 0.99
     kept = {one["name"]: one["value"] for one in document["kept"]}
     worst = max(one.sensitivity for one in (margins.low, margins.middle, margins.high))
     assert kept["sensitivity"] == pytest.approx(worst)
@@ -102,6 +102,30 @@ def test_margins_alone_give_gains_without_a_reference() -> None:
     assert integral[1] < 0.7 * integral[0]
     late = pt.check_loop(pt.load("dahl.json"), controller(report()), delay=0.02)
     assert late.high.sensitivity <= 1.4 * 1.01
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_the_gains_are_printed_as_options_of_track() -> None:
+    printed = ran("tune", "dahl.json", *QUICK)
+    (gains,) = re.findall(r"--kp .*", printed)
+    with_file = ran("track", "results/controller.json", *COURSE, "--json", "--out", "file")
+    by_options = ran("track", "dahl.json", *COURSE, *QUICK[:2], *gains.split(), "--json")
+    errors = [json.loads(one)["metrics"]["rms_error"] for one in (with_file, by_options)]
+    assert errors[1] == pytest.approx(errors[0], rel=1e-3)
+
+
+@pytest.mark.usefixtures("_no_pictures")
+def test_the_margins_are_those_of_python_by_default_and_in_rad() -> None:
+    def bounds(*options: str) -> dict[str, float]:
+        found = parsed(ran("tune", "dahl.json", *QUICK, "--json", "--overwrite", *options))
+        return {one["name"]: one["bound"] for one in found["kept"]}
+
+    usual = bounds()
+    assert usual["gain_margin_dB"] == pytest.approx(20.0 * math.log10(pt.Margins().gain))
+    assert usual["phase_margin_deg"] == pytest.approx(math.degrees(pt.Margins().phase))
+    # What the help gives as defaults.
+    given = bounds("--gain-margin", "6.02dB", "--phase-margin", "0.5rad")
+    assert given == pytest.approx(usual, rel=1e-3)
 
 
 @pytest.mark.slow

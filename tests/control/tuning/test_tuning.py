@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import signal
 import threading
 import time
@@ -71,6 +72,20 @@ def test_the_report_is_that_of_the_exact_check_and_of_a_full_simulation() -> Non
     assert "active constraints" in str(tuned)
 
 
+@pytest.mark.parametrize(("high", "clipped"), [(80e-6, True), (40e-6, False)])
+def test_the_report_says_how_long_the_drive_is_at_its_limits(high: float, clipped: bool) -> None:
+    """1 um/V and 75 V: 80 um are beyond reach."""
+    stage = pt.PrandtlIshlinskiiStage(linear=1e-6, thresholds=(), weights=())
+    line = pt.triangle(frequency=1.0, low=20e-6, high=high, duration=2.0)
+    goal = pt.Goal(largest_saturation=0.9)
+    brief = pt.TuningSearch(particles=8, iterations=4)
+    tuned = pt.tune(stage, line, dt=0.02, limits=LIMITS, parts="pid", goal=goal, search=brief)
+    shares = [float(one) for one in re.findall(r"clipped in ([\d.]+) %", tuned.summary())]
+    share = 100.0 * tuned.runs[0].saturated.mean()
+    assert shares == ([pytest.approx(share, abs=0.06)] if clipped else [])
+    assert (share > 1.0) == clipped
+
+
 @pytest.mark.slow
 def test_a_spread_is_kept_at_its_ends() -> None:
     stage = published_stage()
@@ -102,6 +117,35 @@ def test_a_repetitive_part_is_tuned_where_the_reference_repeats() -> None:
     learnt = pt.track(stage, tuned.controller, reference).score(8.0).rms_error
     assert learnt < 0.95 * pt.track(stage, plain, reference).score(8.0).rms_error
     assert {one.name for one in tuned.kept} >= {"learning"}
+
+
+# Each begins with a cutoff above half the sampling rate, the one near it, the other far.
+NEAR_AND_FAR = {
+    "near": (pt.DahlStage.xu_li_2010(), 2e-3, 1.2e-3),
+    "far": (
+        pt.PrandtlIshlinskiiStage(
+            linear=1e-6,
+            thresholds=(5.0, 10.0),
+            weights=(2e-7, 1e-7),
+            frequency=30.0,
+            damping_ratio=1.2,
+        ),
+        1e-2,
+        6e-3,
+    ),
+}
+
+
+@pytest.mark.parametrize("which", NEAR_AND_FAR)
+def test_no_low_pass_is_faster_than_half_the_sampling_rate(which: str) -> None:
+    stage, dt, delay = NEAR_AND_FAR[which]
+    known: dict[str, Any] = {"dt": dt, "limits": LIMITS, "timing": pt.Timing(delay=delay)}
+    tuned = pt.tune(stage, parts=("pid", "low-pass"), **known)
+    assert all(one.cutoff <= 0.5 / dt for one in tuned.controller.filters)  # type: ignore[attr-defined]
+    report = pt.check_loop(stage, tuned.controller, delay=delay)
+    assert all(one.sensitivity <= 2.0 * 1.01 for _, one in report.cases)
+    # The search may do without it.
+    assert tuned.value <= 1.01 * pt.tune(stage, parts="pid", **known).value
 
 
 def test_the_fastest_of_the_allowed_sampling_rates_wins_on_a_clean_stage() -> None:

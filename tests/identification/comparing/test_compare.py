@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -14,7 +16,7 @@ import pytest
 from matplotlib.patches import Rectangle
 
 import piezotrack as pt
-from commands import names, ran, refusal
+from commands import names, ran, refusal, run, without_progress
 from folders import MEASURED
 from piezotrack.data.log_file import write_log
 from piezotrack.stages.registry import MODELS as LISTED
@@ -385,6 +387,49 @@ def test_the_command_judges_on_another_log_and_takes_files() -> None:
         "compare", "log.csv", "--model", "a/b/prandtl-ishlinskii.json", "--test-window", "6:"
     )
     assert "fitted on 0 to 5.995 s of log.csv" in printed
+
+
+@pytest.mark.parametrize("form", [[], ["--json"]], ids=["table", "json"])
+@pytest.mark.usefixtures("_logs", "_no_pictures")
+def test_ctrl_c_keeps_the_models_that_are_done(
+    form: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second of three fits is interrupted."""
+    only = pt.compare(pt.read("log.csv"), ["prandtl-ishlinskii"], train=(1.0, 5.0))
+    fitted: list[str] = []
+
+    def interrupted(data: pt.Dataset, name: str, **options: Any) -> Any:
+        if fitted:
+            raise KeyboardInterrupt
+        fitted.append(name)
+        return pt.identify(data, name, **options)
+
+    module = "piezotrack.identification.comparison.compare"
+    monkeypatch.setattr(sys.modules[module], "identify", interrupted)
+    plays = ("--model", "prandtl-ishlinskii", "--model", "preisach", "--model", "duhem")
+    done = run("compare", "log.csv", *plays, "--window", "1:5", "--out", "out", *form)
+    assert done.exit_code == 130
+    said = without_progress(done.stderr)
+    assert re.fullmatch(r"piezotrack: interrupted after 1 of 3 models; [^\n]* out\n", said)
+    assert names("out") == ["comparison.json", "prandtl-ishlinskii.json"]
+    if form:
+        document = json.loads(done.stdout)
+        assert [one["name"] for one in document["models"]] == ["prandtl-ishlinskii"]
+        assert "interrupted after 1 of 3 models" in document["notes"]
+    else:
+        assert done.stdout.startswith(only.summary())
+
+
+@pytest.mark.usefixtures("_logs")
+def test_ctrl_c_in_the_first_model_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: Any, **__: Any) -> Any:
+        raise KeyboardInterrupt
+
+    module = "piezotrack.identification.comparison.compare"
+    monkeypatch.setattr(sys.modules[module], "identify", interrupted)
+    done = run("compare", "log.csv", *MODELS, "--out", "out")
+    assert (done.exit_code, done.stdout) == (130, "")
+    assert not Path("out", "comparison.json").exists()
 
 
 REFUSED_COMMANDS: dict[str, tuple[str, ...]] = {

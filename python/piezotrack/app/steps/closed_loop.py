@@ -58,8 +58,6 @@ __all__ = [
 
 # Sensitivities that are kept, from aggressive to robust.
 AGGRESSIVE, ROBUST = 2.0, 1.15
-# Margins of every loop, as of `piezotrack tune`: 6 dB and 30 degrees.
-GAIN, PHASE = 10.0 ** (6.0 / 20.0), math.radians(30.0)
 # Budget of the search that answers at once; a full one follows.
 QUICK = TuningSearch(particles=16, iterations=10, seed=1)
 FULL = TuningSearch(seed=1)
@@ -200,7 +198,7 @@ def margins_of(desk: Desk) -> Margins:
     """Return the margins that the slider from aggressive to robust keeps."""
     share = min(max(desk.state.loop.robustness, 0.0), 1.0)
     sensitivity = float(f"{AGGRESSIVE * (ROBUST / AGGRESSIVE) ** share:.3g}")
-    return Margins(gain=GAIN, phase=PHASE, sensitivity=sensitivity)
+    return Margins(sensitivity=sensitivity)
 
 
 def effort_of(desk: Desk) -> float:

@@ -176,14 +176,7 @@ def controller_lines(desk: Desk) -> list[str]:
         limits=Code("fit.drive_range"),
         feedforward=Code("fit.inverse()"),
         parts=known,
-        margins=Code(
-            call(
-                "pt.Margins",
-                gain=margins.gain,
-                phase=margins.phase,
-                sensitivity=margins.sensitivity,
-            )
-        ),
+        margins=Code(call("pt.Margins", sensitivity=margins.sensitivity)),
         spread=Code(f"pt.Spread(gain={plain(state.spread)})") if state.spread else None,
         goal=Code(f"pt.Goal(effort={effort_of(desk)!r})") if effort_of(desk) else None,
         timing=Code(f"pt.Timing(delay={plain(state.delay)})") if state.delay else None,

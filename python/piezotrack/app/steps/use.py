@@ -124,7 +124,7 @@ class UseStep:
             to=use.to,
             name=use.name,
             single=use.single or None,
-            **({"reference": REFERENCE} if periodic else {}),
+            **({"reference": REFERENCE, "beyond_reach": True} if periodic else {}),
         )
         return [
             *LogStep().python(desk),
@@ -142,9 +142,9 @@ class UseStep:
         use = desk.state.use
         motion = [motion_word(desk)] if reference_of(desk).period is not None else []
         where = "controller.json" if by_hand(desk) else "tuned/controller.json"
-        exported = command(
-            "export", where, *motion, to=use.to, name=use.name, float=use.single, out="firmware"
-        )
+        options = {"to": use.to, "name": use.name, "float": use.single, "out": "firmware"}
+        free = bool(motion)
+        exported = command("export", where, *motion, **options, beyond_reach=free)
         note = ["# controller.json: by the script, as its gains were set by hand"]
         return [
             *ModelStep().commands(desk),
@@ -210,6 +210,7 @@ def _export(desk: Desk, _: Mapping[str, Any]) -> Download:
         name=use.name,
         single=use.single,
         reference=motion if motion.period is not None else None,
+        beyond_reach=True,
     )
     if len(done.files) == 1:
         return Download(done.files[0].name, done.files[0].read_bytes())

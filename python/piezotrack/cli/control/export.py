@@ -12,6 +12,7 @@ from ..options import of_file
 from ..output import Output
 from ..values import FREQUENCY
 from .controller_files import only_controller
+from .loop_options import BeyondReach
 
 if TYPE_CHECKING:
     import numpy as np
@@ -55,6 +56,7 @@ def export_command(
         float | None,
         Option("Clock of the processor: refused where a step does not fit the interval", FREQUENCY),
     ] = None,
+    beyond_reach: BeyondReach = False,
     *,
     motion: Motion,
     output: Output,
@@ -74,7 +76,7 @@ def export_command(
     if to not in ("c99", "firmware"):
         refuse_without_effect(("clock", "fixed"), f"with --to {to}")
     if reference is None:
-        refuse_without_effect(("duration", "period"), "without REFERENCE")
+        refuse_without_effect(("duration", "period", "beyond_reach"), "without REFERENCE")
     known = only_controller(controller, "`piezotrack tune` writes one of a model")
     values = None if table is None else _table(table, known.dt, known.drive_unit)
     desired = None if reference is None else motion.of(reference)
@@ -83,7 +85,7 @@ def export_command(
 
     def save(place: Path) -> list[Path]:
         options: dict[str, Any] = {"to": to, "name": chosen, "clock": clock}
-        options |= {"single": single, "fixed": fixed}
+        options |= {"single": single, "fixed": fixed, "beyond_reach": beyond_reach}
         done.append(export_controller(known, place, reference=desired, table=values, **options))
         return list(done[0].files)
 

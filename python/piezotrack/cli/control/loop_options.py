@@ -14,6 +14,7 @@ from ..options import Bandwidth, Delay, Limits, Noise, Seed
 from ..values import GAIN, LOOP_TIME
 
 if TYPE_CHECKING:
+    from ...control.controller.controller import Controller
     from ...control.laws.pid import Pid
     from ...control.loop.stability import LoopCheck
     from ...control.loop.tracking import Tracking
@@ -39,6 +40,7 @@ __all__ = [
     "drive_notes",
     "driven_by_voltage",
     "gain_of",
+    "gains_as_options",
     "known_model",
     "repetitive_part",
     "small_margins",
@@ -270,6 +272,17 @@ def gain_of(option: str, gain: float, model: IdentifiedModel | None) -> float:
     name, scale = shown_unit(unit_of(True, model))
     _check_unit(option, gain, name)
     return gain * (1e6 / scale)
+
+
+def gains_as_options(controller: Controller) -> str:
+    """Write the gains of a PID law as `FeedbackOptions` take them; empty for another law."""
+    law = controller.feedback
+    if law is None or law.info.name != "pid":
+        return ""
+    pid, (unit, scale) = law._pid, shown_unit(controller.drive_unit)
+    times = {"ti": pid.ti, "td": pid.td} | ({} if pid.tt is None else {"tt": pid.tt})
+    words = [f"--{name} {1e3 * one:.5g}ms" for name, one in times.items()]
+    return " ".join([f"--kp {1e-6 * scale * pid.kp:.5g}{unit}/um", *words])
 
 
 def _check_unit(option: str, value: float, drive: str) -> None:

@@ -11,9 +11,17 @@ from ..command import Argument, Option, command, refuse_without_effect
 from ..option_groups import Motion
 from ..options import Sensitivity, Zero
 from ..output import Output
-from ..values import DECIBELS, DEGREES, LENGTH, LOOP_TIME, PERCENT
+from ..values import ANGLE, DECIBELS, LENGTH, LOOP_TIME, PERCENT
 from .controller_files import response_in
-from .loop_options import PAPER, LoopOptions, Simulation, Stage, known_model, zero_words
+from .loop_options import (
+    PAPER,
+    LoopOptions,
+    Simulation,
+    Stage,
+    gains_as_options,
+    known_model,
+    zero_words,
+)
 
 __all__ = ["tune_command"]
 
@@ -49,8 +57,13 @@ def tune_command(
             "Error that a change of the command of 1 V rms from sample to sample is worth", LENGTH
         ),
     ] = 0.0,
-    gain_margin: Annotated[float, Option("Least gain margin", DECIBELS)] = 6.0,
-    phase_margin: Annotated[float, Option("Least phase margin", DEGREES)] = 30.0,
+    gain_margin: Annotated[
+        float | None,
+        Option("Least gain margin, as 6dB; default 6.02dB, a factor of 2", DECIBELS),
+    ] = None,
+    phase_margin: Annotated[
+        float | None, Option("Least phase margin, as 30deg; default 0.5rad, 28.6deg", ANGLE)
+    ] = None,
     sensitivity: Sensitivity = 2.0,
     gain_spread: Annotated[
         float, Option("Range of the stage's gain about the model's", PERCENT)
@@ -80,8 +93,13 @@ def tune_command(
     from ...control.tuning.tune import tune
     from ...control.tuning.tuned import picture_name
 
-    _within("--gain-margin", gain_margin, 1e-6, 400.0, "dB, above 0 and below 400")
-    _within("--phase-margin", phase_margin, 0.0, 180.0, "degrees, 0 to below 180")
+    margins = {"sensitivity": sensitivity}
+    if gain_margin is not None:
+        _within("--gain-margin", gain_margin, 1e-6, 400.0, "dB, above 0 and below 400")
+        margins["gain"] = 10.0 ** (gain_margin / 20.0)
+    if phase_margin is not None:
+        _within("--phase-margin", phase_margin, 0.0, 180.0, "degrees, 0 to below 180")
+        margins["phase"] = math.radians(phase_margin)
     _within("--sensitivity", sensitivity, 1.0, math.inf, "a factor above 1")
     _within("--mode-spread", mode_spread, 0.0, 95.0, "per cent, 0 to below 95")
     _within("--gain-spread", gain_spread, 0.0, 95.0, "per cent, 0 to below 95")
@@ -115,11 +133,7 @@ def tune_command(
         limits=limits,
         feedforward=inverse,
         parts=None if parts is None else [one.strip() for one in parts.split(",")],
-        margins=Margins(
-            gain=10.0 ** (gain_margin / 20.0),
-            phase=math.radians(phase_margin),
-            sensitivity=sensitivity,
-        ),
+        margins=Margins(**margins),
         spread=Spread(delay=(0.0, delay_spread), mode=0.01 * mode_spread, gain=0.01 * gain_spread),
         goal=Goal(
             minimise=minimise,
@@ -130,6 +144,11 @@ def tune_command(
         search=TuningSearch(seed=simulation.seed),
     )
     words = f"stage: {stage or model.name}{zeroed}\n{tuned}"
+    if gains := gains_as_options(tuned.controller):
+        made = tuned.controller
+        others = ", without filters" if made.filters else ""
+        others += ", without the repetitive part" if made.repetitive is not None else ""
+        words += f"\nas options of `track`{others}: {gains}"
     output.show(words, tuned.document(), output.write(tuned.save, "controller.json"))
 
 

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
+from ...errors import Interrupted
 from ..command import Option, command, refuse_without_effect
+from ..connection import with_what_is_kept
 from ..option_groups import LogOptions
 from ..options import LogFile, Seed, TestLog, TestWindow, Threads, Window, cut, of_file
 from ..output import Output
 from ..values import Names
 from .fit_options import listed
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from ...identification.comparison.compare import Comparison
 
 __all__ = ["compare_command"]
 
@@ -54,15 +62,25 @@ def compare_command(
         names = comparison_files(model or None, log.drive_unit)
     output.will_write(name for name in names if (output.folder / name).resolve() not in given)
     with of_file(file):
-        comparison = compare(
-            log,
-            model or None,
-            train=window,
-            test=test_window if second is None else second,
-            seed=seed,
-            runs=runs,
-            threads=threads,
-            progress=output.progress,
-        )
-    document = {**comparison.document(), "notes": comparison.notes}
+        try:
+            comparison = compare(
+                log,
+                model or None,
+                train=window,
+                test=test_window if second is None else second,
+                seed=seed,
+                runs=runs,
+                threads=threads,
+                progress=output.progress,
+            )
+        except Interrupted as error:
+            shown = partial(_show, output, notes=[str(error)])
+            raise with_what_is_kept(error, "compared", shown) from None
+    _show(output, comparison)
+
+
+def _show(output: Output, comparison: Comparison, notes: Iterable[str] = ()) -> str:
+    """Print and write a comparison; say where it is."""
+    document = {**comparison.document(), "notes": [*comparison.notes, *notes]}
     output.show(comparison.summary(), document, output.write(comparison.save))
+    return f"what was done is in {output.out}"

@@ -15,7 +15,7 @@ from ..._support.units import shown_unit
 from ...errors import NumericalError, ParameterError
 from ...identification.fitted.identified_model import IdentifiedModel
 from ...stages.inverse import Inverse
-from ..parts.filters import Filter
+from ..parts.filters import Filter, LowPass
 from ..parts.part import FeedbackLaw
 from ..parts.repetitive import Repetitive
 from ..plant import displacement_range
@@ -130,6 +130,9 @@ class Controller:
         expect("filters", self.filters, Sequence, "a list of filters")
         for i, part in enumerate(self.filters):
             expect(f"filters[{i}]", part, Filter, "pt.LowPass or pt.Notch")
+            if isinstance(part, LowPass) and part.cutoff * dt > 0.5 * (1.0 + 1e-9):
+                half = f"at most half the sampling rate, {0.5 / dt:.6g} Hz"
+                raise ParameterError("cutoff", f"{part.cutoff:g} Hz", half)
         inside = None if self.feedback is None else self.feedback._pid
         if inside is not None:
             _check_unit("kp", inside.kp, high - low, "Pid", self.drive_unit)

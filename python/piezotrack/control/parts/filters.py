@@ -22,7 +22,7 @@ class LowPass(Filter):
     Parameters
     ----------
     cutoff : float
-        Frequency at which half of the power passes [Hz].
+        Frequency at which half of the power passes [Hz], at most half the sampling rate.
     """
 
     cutoff: float

@@ -69,6 +69,18 @@ class Box(NamedTuple):
             )
         return Parts(law, tuple(filters), repetitive)
 
+    def cutoffs_beside(self, settings: dict[str, float]) -> tuple[float, float] | None:
+        """Range of cutoffs for one above half the sampling rate [Hz]; None where it is not.
+
+        What is nearer: below that, or where the low-pass is left out.
+        """
+        share = settings.get("cutoff", 0.0) * self.dt
+        if not 0.5 < share <= FASTEST:
+            return None
+        low, high = next((low, high) for name, low, high, _ in self.ranges if name == "cutoff")
+        left_out = share * share > 0.5 * FASTEST
+        return (1.01 * FASTEST / self.dt, high) if left_out else (low, NYQUIST / self.dt)
+
     def edges(self, settings: dict[str, float], drive_unit: str) -> list[str]:
         """Name the settings that are at an end of their range, with the drive's unit of a gain."""
         notes = []

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..loop.tracking import Tracking
     from ..on_device.closed_loop import DeviceTracking
 
-__all__ = ["device_tracking_text", "tracking_text"]
+__all__ = ["clipped_text", "device_tracking_text", "tracking_text"]
 
 
 def tracking_text(run: Tracking) -> str:
@@ -27,7 +27,7 @@ def tracking_text(run: Tracking) -> str:
     if moves := run.settling():
         lines.append(_settled(moves))
     if run.saturated.any():
-        lines.append(f"clipped in {100.0 * run.saturated.mean():.1f} % of the samples")
+        lines.append(clipped_text(run))
     if run.periods:
         lines.append("period  max um  rms um  mean um")
         lines += [
@@ -36,6 +36,11 @@ def tracking_text(run: Tracking) -> str:
             for i, figures in enumerate(run.periods, 1)
         ]
     return "\n".join(lines)
+
+
+def clipped_text(run: Tracking) -> str:
+    """Write the share of the samples at which the command was clipped to the limits."""
+    return f"clipped in {100.0 * run.saturated.mean():.1f} % of the samples"
 
 
 def _settled(moves: list[Settling]) -> str:

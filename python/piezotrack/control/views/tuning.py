@@ -20,8 +20,10 @@ from ..._support.display.plot_style import (
 )
 from ..._support.statistics import ErrorStatistics
 from ..._support.units import shown_unit
+from ..loop.tracking import Tracking
 from ..tuning.structures import gains_of
 from ..tuning.tuned import motion_of
+from .tracking_text import clipped_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -62,6 +64,9 @@ def tuned_text(tuned: Tuned) -> str:
         seen = "" if measured == true else "measured "
         lines.append(f"{motion_of(run)!r}: {seen}{word}{run.metrics}")
         lines += [f"  true {word}{true}"] if seen else []
+        axes = {"": run} if isinstance(run, Tracking) else {"of x ": run.x, "of y ": run.y}
+        clipped = {axis: one for axis, one in axes.items() if one.saturated.any()}
+        lines += [f"  the drive {axis}is {clipped_text(one)}" for axis, one in clipped.items()]
     if tuned.other_kind is not None:
         model, error = tuned.other_kind
         lines.append(f"on a {model} stage fitted to the same record: {1e6 * error:.4g} um rms")

@@ -9,7 +9,8 @@ import numpy as np
 from ..._support.arrays import signal_of
 from ..._support.units import of_drive
 from ...control.laws.neural_network import NetworkInverse
-from ...control.loop.preconditions import check_period, check_turns
+from ...control.loop.preconditions import check_period, check_turns, check_within_reach
+from ...control.plant import plant_of_inverse
 from ...errors import DataError, ParameterError, ShapeError
 from .input import filters, numbers, readings
 from .inverse import INVERSE_TERMS, dahl_inverse, square_root, voltage_table
@@ -67,7 +68,11 @@ def coefficients_of(controller: Controller) -> Numbers:
 
 
 def feedforward_table(
-    controller: Controller, reference: Reference | None, given: ArrayLike | None = None
+    controller: Controller,
+    reference: Reference | None,
+    given: ArrayLike | None = None,
+    *,
+    beyond_reach: bool = False,
 ) -> list[float] | None:
     """Return one period of the feedforward: that which is given, or the inverse's; None for none.
 
@@ -79,6 +84,8 @@ def feedforward_table(
         Motion for which the inverse makes it, settled.
     given : array_like, shape (n,), optional
         The voltages themselves, in the unit of the drive.
+    beyond_reach : bool, optional
+        Whether the reference may exceed the reach of the stage that the inverse inverts.
 
     Returns
     -------
@@ -89,7 +96,7 @@ def feedforward_table(
     ------
     ParameterError
         The controller has no feedforward, the reference has no whole period, or not that of the
-        repetitive part; both are given.
+        repetitive part, or exceeds the reach of the stage; both are given.
     DataError, ShapeError
         What is given is no table for these limits.
     """
@@ -116,6 +123,9 @@ def feedforward_table(
             verb="has",
         )
     check_period(controller, reference)
+    if not beyond_reach:
+        plant, unit = plant_of_inverse(controller.feedforward), controller.drive_unit
+        check_within_reach(plant, controller.limits, reference.sample(controller.dt), unit)
     table = controller.feedforward.table(reference, controller.dt, limits=controller.limits)
     return [float(one) for one in table]
 

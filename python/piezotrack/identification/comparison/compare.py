@@ -20,7 +20,7 @@ from ..._support.files.writing import (
     write_document,
 )
 from ...data.dataset import Dataset
-from ...errors import ParameterError
+from ...errors import Interrupted, ParameterError
 from ...stages.registry import MODELS, ModelInfo, model_named
 from ..fit import identify
 from ..fitted.identified_model import IdentifiedModel
@@ -264,7 +264,7 @@ def compare(
     DataError
         A record cannot be used, see `identify`; a file is not that of a model.
     Interrupted
-        Ctrl-C stopped a search.
+        Ctrl-C stopped a search; `partial` is the comparison of the models before.
 
     Examples
     --------
@@ -294,19 +294,26 @@ def compare(
     )
     for i, (name, title, source) in enumerate(wanted):
         fitted: IdentifiedModel
-        if isinstance(source, ModelInfo):
-            with parts.begin(i):
-                fitted = identify(
-                    first,
-                    source.name,
-                    history=history,
-                    method=method,
-                    threads=threads,
-                    progress=progress,
-                )
-        else:
-            fitted = source
-        rows.append(_compared(name, title, fitted, first, second, carried))
+        try:
+            if isinstance(source, ModelInfo):
+                with parts.begin(i):
+                    fitted = identify(
+                        first,
+                        source.name,
+                        history=history,
+                        method=method,
+                        threads=threads,
+                        progress=progress,
+                    )
+            else:
+                fitted = source
+            rows.append(_compared(name, title, fitted, first, second, carried))
+        except KeyboardInterrupt:
+            if not rows:
+                raise
+            done = Comparison(rows=tuple(rows), train=first, test=second, carried=carried)
+            words = f"interrupted after {len(rows)} of {len(wanted)} models"
+            raise Interrupted(words, done) from None
     return Comparison(rows=tuple(rows), train=first, test=second, carried=carried)
 
 

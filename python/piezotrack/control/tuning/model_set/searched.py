@@ -52,15 +52,24 @@ class AxisSearch(NamedTuple):
             repetitive=parts.repetitive,
         )
 
-    def sought(self, plants: Iterable[int] | None = None) -> _core.SoughtController:
-        """Return what the core searches, under the margins of some plants or of all."""
+    def sought(
+        self, plants: Iterable[int] | None = None, cutoffs: tuple[float, float] | None = None
+    ) -> _core.SoughtController:
+        """Return what the core searches, under the margins of some plants or of all.
+
+        `cutoffs` take the place of the range of the low-pass [Hz].
+        """
         numbers = range(len(self.plants)) if plants is None else plants
+        ranges = [
+            one if cutoffs is None or one[0] != "cutoff" else (one[0], *cutoffs, one[3])
+            for one in self.box.ranges
+        ]
         return _core.SoughtController(
             controller=self.base._core,
             period=self.box.period,
             sign=self.box.sign,
             law=(self.box.law, *self.box.nominal),
-            sought=self.box.ranges,
+            sought=ranges,
             plants=[self.plants[i].plant for i in numbers],
         )
 
@@ -106,16 +115,33 @@ class SearchedSet:
         *,
         along: bool = True,
     ) -> dict[str, Any]:
-        """Search for the best settings, along the references or from margins alone."""
+        """Search for the best settings, along the references or from margins alone.
+
+        Where the best has a low-pass with a cutoff above half the sampling rate, the search is
+        repeated with what is nearer: one below that, or none.
+        """
         tasks = [one for i in self.stages for one in self._tasks[i]] if along else []
-        return _core.tune(
-            problem,
-            margins=margins,
-            axes=self._sought,
-            tasks=tasks,
-            stages=len(self.stages) if tasks else 1,
-            starts=starts,
-        )
+
+        def tuned(sought: list[_core.SoughtController]) -> dict[str, Any]:
+            return _core.tune(
+                problem,
+                margins=margins,
+                axes=sought,
+                tasks=tasks,
+                stages=len(self.stages) if tasks else 1,
+                starts=starts,
+            )
+
+        outcome = tuned(self._sought)
+        pairs = zip(self.axes, outcome["settings"], strict=True)
+        cutoffs = [axis.box.cutoffs_beside(dict(settings)) for axis, settings in pairs]
+        if all(one is None for one in cutoffs):
+            return outcome
+        axes = zip(self.axes, self.plants, cutoffs, strict=True)
+        again = tuned([axis.sought(some, one) for axis, some, one in axes])
+        for effort in ("candidates", "loops"):
+            again[effort] += outcome[effort]
+        return again
 
     def cost(self, settings: Sequence[Any]) -> tuple[float, float]:
         """Evaluate settings on the stages that are simulated: excess without margins, and cost."""
