@@ -62,10 +62,12 @@ def with_rest_tried(
     return jumped if jumped.cost < (1.0 - GAIN) * before else fit
 
 
-def with_rest(problem: Problem, identify: Callable[[Problem], Identification]) -> Identification:
+def with_rest(
+    problem: Problem, identify: Callable[[Problem], Identification], voltage: float = 0.0
+) -> Identification:
     """Identify a stage that was at rest until the drive jumped to the first sample.
 
-    At rest at 0 V, or at another voltage where that lowers the residual by 2 %.
+    At rest at a voltage, or at another one where that lowers the residual by 2 %.
 
     Parameters
     ----------
@@ -73,6 +75,8 @@ def with_rest(problem: Problem, identify: Callable[[Problem], Identification]) -
         The problem, of one record.
     identify : callable
         What solves a problem.
+    voltage : float, optional
+        Voltage [V] to begin with.
 
     Returns
     -------
@@ -88,7 +92,7 @@ def with_rest(problem: Problem, identify: Callable[[Problem], Identification]) -
     if len(problem.records) > 1:
         raise ParameterError("history", "'rest'", "another one of several records")
     data = problem.records[0].data
-    fit = _at_rest(problem, identify, 0.0)
+    fit = _at_rest(problem, identify, voltage)
     if carried_by_first_samples(_left(fit, fit.data)):
         begun = _begun(problem)
         grid = np.linspace(*_voltages(data), COARSE)

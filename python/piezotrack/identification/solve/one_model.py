@@ -61,12 +61,12 @@ def identify_model(
         As for `identify`.
     """
 
-    def identify(other: Problem, start: Structure | None) -> Identification:
+    def identify(other: Problem, start: Structure | None, voltage: float = 0.0) -> Identification:
         def plain(one: Problem) -> Identification:
             return _identify(one, method, run, start)
 
         if any(record.history == "rest" for record in other.records):
-            return with_rest(other, plain)
+            return with_rest(other, plain, voltage)
         fit = plain(other)
         return with_rest_tried(other, fit, plain) if len(other.records) == 1 else fit
 

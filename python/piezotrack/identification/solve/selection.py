@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from ..fitted.identification import Identification
     from ..methods.choice import MethodChoice
     from ..problem.problem import Problem
-    from ..problem.records import Record
     from .run import Run
 
     Array = NDArray[np.float64]
@@ -124,7 +123,7 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
         raise trials.refused or DataError("no model could be fitted")
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
     with shares.begin(len(infos)):
-        fit = identify_model(problem.of_model(best.info), methods.method(best.info), run)
+        fit = identify_model(trials.whole(problem, best.info), methods.method(best.info), run)
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
 
 
@@ -152,13 +151,19 @@ class _Trials:
     refused: Exception | None = None
     # Least residual so far, in multiples of the noise.
     least: float = math.inf
-    # Structure of the first fit by least squares.
+    # Structure of the first fit by least squares, and which records have a delay in it.
     start: Structure | None = None
+    delayed: list[bool] = field(default_factory=list)
 
     def near_best(self, name: str | None) -> bool:
         """Return whether a model, if it was tried, comes near the best one."""
         rms = {tried.info.name: tried.trial.rms for tried in self.found}
         return name not in rms or rms[name] <= NEAR_BEST * min(rms.values())
+
+    def whole(self, problem: Problem, info: ModelInfo) -> Problem:
+        """Return the problem of a model on the whole records, with the delays that were shown."""
+        shown = any(self.delayed) and not info.searched
+        return (_with_delays(problem, self.delayed) if shown else problem).of_model(info)
 
     def run(self, info: ModelInfo) -> bool:
         """Try a model; return whether it leaves nothing but noise."""
@@ -176,8 +181,8 @@ class _Trials:
         if isinstance(method, LeastSquares) and self.start is None:
             self.start = Structure.of(fit)
             # The first model decides whether others have a delay.
-            shown = [record.delay != 0.0 for record in fit.records]
-            self.problem = replace(self.problem, records=_with_delays(self.problem.records, shown))
+            self.delayed = [record.delay != 0.0 for record in fit.records]
+            self.problem = _with_delays(self.problem, self.delayed)
         records = self.problem.records
         counts = np.array(
             [one.weight * len(rest) for one, rest in zip(records, self.rests, strict=True)]
@@ -198,10 +203,13 @@ class _Trials:
         return bool(np.all(plain < AS_NOISE * noise)) and all(is_white(one) for one in counted)
 
 
-def _with_delays(records: tuple[Record, ...], shown: list[bool]) -> tuple[Record, ...]:
+def _with_delays(problem: Problem, shown: list[bool]) -> Problem:
     """Fit a delay where nothing is given and one is shown, and none elsewhere."""
-    both = zip(records, shown, strict=True)
-    return tuple(replace(one, delay=delayed) if one.delay is None else one for one, delayed in both)
+    records = tuple(
+        replace(record, delay=delayed) if record.delay is None else record
+        for record, delayed in zip(problem.records, shown, strict=True)
+    )
+    return replace(problem, records=records)
 
 
 def noise_of(data: Dataset) -> float:

@@ -20,15 +20,16 @@ __all__ = ["with_delay_tried"]
 
 # Share of the cost that a delay has to take away: creep and a lag turn the phase as it does.
 GAIN = 0.05
-# A residual of so many times the noise has hardly anything but noise in it.
-NOISY = 1.05
+# A residual of so many times the noise has hardly anything but noise in it; up to so many times, a
+# delay changes its structure little.
+NOISY, NEAR = 1.05, 3.0
 
 
 def with_delay_tried(
     problem: Problem,
     method: Method,
     start: Structure | None,
-    identify: Callable[[Problem, Structure | None], Identification],
+    identify: Callable[..., Identification],
 ) -> Identification:
     """Solve a problem, with a delay of each record where nothing is given and one is shown.
 
@@ -41,7 +42,7 @@ def with_delay_tried(
     start : Structure, optional
         Structure that least squares begin with.
     identify : callable
-        What solves a problem from a structure.
+        What solves a problem from a structure, and from a voltage of rest.
 
     Returns
     -------
@@ -52,15 +53,20 @@ def with_delay_tried(
     given = any(record.delay is not None for record in problem.records)
     if given or not isinstance(method, LeastSquares) or method.dynamics != "auto":
         return fit
-    if fit.cost <= NOISY * min(fit.noises):
+    noise = min(fit.noises)
+    if fit.cost <= NOISY * noise:
         return fit
-    records = tuple(replace(record, delay=True) for record in problem.records)
-    delayed = replace(problem, records=records)
+    records = [replace(record, delay=True) for record in problem.records]
+    voltage = 0.0
+    if fit.start is not None and fit.start.history == "rest" and fit.start.voltage is not None:
+        records[0], voltage = replace(records[0], history="rest"), fit.start.voltage
+    delayed = replace(problem, records=tuple(records))
     least = (1.0 - GAIN) * fit.cost
     try:
-        late = identify(delayed, Structure.of(fit))
-        if start is None and late.cost < least:
-            late = identify(delayed, None)
+        resumes = start is not None or fit.cost < NEAR * noise
+        late = identify(delayed, Structure.of(fit) if resumes else None, voltage)
+        if resumes and start is None and late.cost < least:
+            late = identify(delayed, None, voltage)
     except (DataError, NumericalError):
         return fit
     return late if late.cost < least else fit

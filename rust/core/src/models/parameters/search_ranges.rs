@@ -25,6 +25,8 @@ const MODE_DAMPING: Range = (0.003, 2.0);
 /// Quickness of a drive over its frequency up to which it is one sine: a chirp has 1.3, whatever
 /// its ends.
 const SINE: f64 = 1.15;
+/// Samples before the window of a record that begins with a jump.
+const JUMP: usize = 2;
 
 /// Lower and upper end of a range.
 pub type Range = (f64, f64);
@@ -80,7 +82,7 @@ impl Measures {
     /// Measures a drive and the displacement `y` (m) under it, in the samples that count.
     #[must_use]
     pub fn of(drive: &Drive<'_>, y: &[f64], window: core::ops::Range<usize>) -> Self {
-        let (u, y, dt) = (&drive.u[window.clone()], &y[window], drive.dt);
+        let (u, y, dt) = (&drive.u[window.clone()], &y[window.clone()], drive.dt);
         let ((low, high), (least, most)) = (range(u), range(y));
         let stroke = most - least;
         let mean = u.iter().sum::<f64>() / index(u.len());
@@ -90,7 +92,9 @@ impl Measures {
         let together: f64 = u.iter().zip(y).map(|(u, y)| (u - mean) * (y - level)).sum();
         let gain = stroke / (high - low);
         let twice = 2.0 * core::f64::consts::TAU / (index(u.len()) * dt);
-        let quickness = quickness(u, dt);
+        // A jump at the beginning of a record moves the stage, though its window begins after it.
+        let begun = if window.start <= JUMP { 0 } else { window.start };
+        let quickness = quickness(&drive.u[begun..window.end], dt);
         // One sine moves at its own rate, however long it is.
         let slow = if quickness < SINE * frequency { frequency } else { frequency.min(twice) };
         Self {
