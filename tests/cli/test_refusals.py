@@ -104,6 +104,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
         "(0.2, 0.1)",
         "lower one first",
     ),
+    "identify log.csv --model dahl --bound mass=0.2..0.1": ("(0.2, 0.1)", "lower one first"),
     "identify log.csv --bound mass=1": ("--bound", "'1'", "LOW:HIGH"),
     "identify log.csv --bound mass=a:b": ("--bound has 'a'", "number"),
     "identify log.csv --model dahl --prior mass=1": ("--prior", "'1'", "VALUE:WIDTH"),
@@ -124,6 +125,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "identify log.csv --model dahl --fix b0=nan": ("b0 is NaN", "finite"),
     "identify log.csv --sensor-delay -1": ("delay is -1 s", "0 s or above"),
     "identify log.csv --sensor-delay 5s:1s": ("delay is (5, 1) s", "the lower bound first"),
+    "identify log.csv --sensor-delay 5s..1s": ("delay is (5, 1) s", "the lower bound first"),
     "identify log.csv --sensor-delay late": (
         "--sensor-delay has 'late'",
         "fit, a time as 2ms, or bounds",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 from ...errors import ParameterError
 from ..command import Argument, Option, given, group, refuse_without_effect
 from ..options import number, pairs
-from ..values import LOOP_TIME, TIME, Names, Ranged, numbers
+from ..values import LOOP_TIME, TIME, Names, Ranged, numbers, parted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -357,8 +357,8 @@ def _prior(option: str, text: str) -> tuple[float, float]:
 
 
 def _bounds(option: str, text: str) -> tuple[float, float]:
-    low, colon, high = text.partition(":")
-    if not colon:
+    low, mark, high = parted(text)
+    if not mark:
         raise ParameterError(option, f"'{text}'", "LOW:HIGH", verb="has")
     return number(option, low), number(option, high)
 
@@ -397,7 +397,7 @@ def delay_asked(text: str | None) -> bool | float | tuple[float, float] | None:
     """Parse the delay of a log [s]."""
     if text is None or text == "fit":
         return None if text is None else True
-    if ":" in text:
+    if parted(text)[1]:
         low, high = Ranged(LOOP_TIME, "LOW:HIGH").parse("--sensor-delay", text)
         return low or 0.0, high or 0.0
     return _time("--sensor-delay", text, "fit, a time as 2ms, or bounds as 0:5ms")
