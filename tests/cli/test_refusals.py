@@ -70,6 +70,33 @@ def test_refuses_a_bad_log(name: str) -> None:
         assert refusal("identify", "log.csv", "--test", "bad.csv") == sentence
 
 
+@pytest.mark.parametrize(
+    ("wrong", "option", "value"),
+    [
+        (("--duration", "0.01"), "--duration", "0.01 s"),
+        (("--slew", "1V/s"), "--slew", "1 V/s"),
+        (("--limits", "3..0V"), "--limits", "(3, 0)"),
+        (("--rate", "1Hz"), "--duration", "4 s"),
+    ],
+)
+def test_suggest_blames_the_option_and_not_the_model(
+    wrong: tuple[str, ...], option: str, value: str
+) -> None:
+    write_model()
+    usual = ("--limits", "0:3V", "--slew", "20V/s", "--duration", "4s", "--rate", "200Hz")
+    sentence = refusal("suggest", "dahl.json", *usual, "--noise", "5nm", *wrong)
+    assert sentence.startswith(f"{option} ")
+    assert value in sentence
+    assert "dahl.json" not in sentence
+
+
+def test_a_file_is_named_once() -> None:
+    for command in ("noise", "identify", "step"):
+        sentence = refusal(command, "log.csv", "--window", "1000:")
+        assert sentence.count("log.csv") == 1
+        assert "--window" in sentence
+
+
 BAD_DRIVES = ("empty", "text", "infinity", "a short line", "a gap", "an unknown unit", "binary")
 
 
@@ -173,6 +200,9 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "identify log.csv log.csv --test-window 1:2": ("--test-window", "--test"),
     "simulate gone.json log.csv": ("gone.json: no such file",),
     "simulate log.csv log.csv": ("log.csv:1: not JSON",),
+    "simulate log.csv dahl.json": ("log.csv and dahl.json are the wrong way round",),
+    "watch log.csv dahl.json": ("log.csv and dahl.json are the wrong way round",),
+    "feedforward sine:1Hz,0..5um dahl.json": ("are the wrong way round", "MODEL REFERENCE"),
     "simulate other.json log.csv": ("other.json is not a piezotrack model",),
     "simulate dahl.json gone.csv": ("gone.csv: there is no such file",),
     "simulate dahl.json log.csv --dt 0": ("log.csv", "dt is 0", "above 0"),

@@ -15,6 +15,7 @@ __all__ = ["as_options", "command_at_work"]
 OPTIONS = {
     "delay": "sensor_delay",
     "rates": "frequencies",
+    "seconds": "duration",
     "searches": "runs",
     "count": "plays",
     "dead_zones": "asymmetry",

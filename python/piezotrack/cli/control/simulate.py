@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from ...errors import DataError, ParameterError
 from ..command import Argument, Option, command
 from ..option_groups import DriveColumns
-from ..options import ModelFile, Zero, of_file
+from ..options import ModelFile, Zero, in_order, of_file
 from ..output import Output
 from .loop_options import known_model, zero_words
 
@@ -44,6 +44,7 @@ def simulate_command(
     from ...data.reader import drive_dataset
     from ...identification.views.plot import plot_response
 
+    in_order(model, log)
     known = known_model(model, zero=zero)
     record = drive_dataset(log, **columns.arguments)
     name, scale = shown_unit(known.drive_unit)

@@ -55,7 +55,7 @@ def suggest_command(
         raise ParameterError("--dt", "missing", "a sampling interval, or a rate by --rate")
     known = load(model)
     output.will_write(["suggested.csv", "suggested.json", *picture_files("suggested")])
-    with of_file(model):
+    with of_file(model, options=("limits", "slew", "seconds", "dt", "seed")):
         drive = suggest_drive(
             known,
             limits=of_voltage("--limits", limits),
