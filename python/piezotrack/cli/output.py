@@ -163,10 +163,10 @@ class Output(Printing):
 
     def _style(self) -> AbstractContextManager[None]:
         """Draw and save pictures as the options say."""
-        from .._support.display.look import figure_style
+        from .._support.display.look import looking
 
         style: Style | None = None if self.width is None else "paper"
-        return figure_style(style, width=self.width, formats=self.formats)
+        return looking(style, self.width, self.formats)
 
     def _formatted(self, name: str) -> list[str]:
         """Return the files that a picture becomes, of its usual formats."""
