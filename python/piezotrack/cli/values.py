@@ -120,7 +120,8 @@ class Quantity(ParamType):
             return Number.of(number * self.units[unit], unit)
         known = (OTHER_UNITS.get(unit) or lookup(unit)) if self.quantity else None
         if known is None or known.quantity != self.quantity:
-            raise ParameterError(option, f"'{text}'", self._expected, verb="has")
+            wanted = f"a {self.quantity}, {self.example}" if self.quantity else self._expected
+            raise ParameterError(option, f"'{text}'", wanted, verb="has")
         return Number.of(number * known.factor / known.divisor, known.name)
 
     @property

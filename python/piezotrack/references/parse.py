@@ -253,7 +253,8 @@ def made_from_text(
     if kind is None or (is_there and not colon):
         # A colon after one letter belongs to a drive of Windows.
         is_path = not colon or len(name) == 1
-        if is_there or (is_path and Path(text).suffix):
+        # What follows the last dot of a range is a number.
+        if is_there or (is_path and Path(text).suffix[1:2].isalpha()):
             return read(text, duration=duration)
         raise ParameterError(
             f"{what} {quoted(text)}",

@@ -111,6 +111,14 @@ def test_a_change_that_could_not_be_seen_is_not_called_unchanged() -> None:
     assert lag.reason in rows["lag"]
 
 
+def test_a_sensor_without_noise_is_judged_too() -> None:
+    log = watched(31)
+    health = pt.watch(model_watched(), pt.Dataset(u=log.u, y=np.full(log.u.size, 2e-6), dt=DT))
+    assert health["noise"].value == 0.0
+    assert health["noise"].verdict == "changed"
+    assert health["noise"].detectable is None
+
+
 def test_a_small_drive_does_not_judge_the_loop() -> None:
     health = pt.watch(model_watched(), watched(8, top=9.0))
     assert {health[one].verdict for one in ("gain", "hysteresis")} == {"not judged"}

@@ -125,7 +125,10 @@ def _pieces(
         return {title if window is None else f"{title} {begin:.6g} to {end:.6g} s": log}
     if not 2.0 * log.dt < every <= end - begin + log.dt:
         raise ParameterError(
-            "--every", f"{every:g} s", f"at most the length of {title}, {end - begin:.6g} s"
+            "--every",
+            f"{every:g} s",
+            f"more than 2 samples of {title}, {2.0 * log.dt:.6g} s, and at most its length, "
+            f"{end - begin:.6g} s",
         )
     count = int((end - begin + 1.5 * log.dt) / every)
     starts = [begin + k * every for k in range(count)]

@@ -109,13 +109,12 @@ class Kinds:
         """Refuse options that one of the models does not have; `fixed` are parameters."""
         for name in self.names:
             if name == AUTO:
-                reason = (
-                    "with --model auto: name the model whose parameters these are, as --model dahl"
-                )
-                refuse_without_effect(OF_ONE_MODEL, reason)
+                reason = "with --model auto"
+                expected = "the model whose parameters these are, as --model dahl"
+                refuse_without_effect(OF_ONE_MODEL, reason, expected)
                 # The one parameter that all models with a mass have.
                 if not set(fixed) <= {"stiffness"}:
-                    refuse_without_effect(("fix",), reason)
+                    refuse_without_effect(("fix",), reason, expected)
             elif not searched(name):
                 reason = f"with the model {name}, which is fitted by least squares"
                 refuse_without_effect(OF_SEARCH, reason)

@@ -57,12 +57,15 @@ class Change(NamedTuple):
     def detectable(self) -> float | None:
         """Least change that the record shows, in `unit`; of residual and noise a ratio.
 
-        A smaller one leaves the verdict "unchanged". None where the change is not judged.
+        A smaller one leaves the verdict "unchanged". None where the change is not judged, and of a
+        ratio of 0.
         """
         if self.value is None or self.interval is None:
             return None
         low = self.interval[0]
-        return self.value / low if self.name in RATIOS else self.value - low
+        if self.name not in RATIOS:
+            return self.value - low
+        return self.value / low if low > 0.0 else None
 
 
 class Refit(NamedTuple):
