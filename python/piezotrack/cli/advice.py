@@ -11,6 +11,7 @@ __all__ = ["as_options", "command_at_work"]
 
 # Arguments whose option has another name.
 OPTIONS = {
+    "creep_times": "creep",
     "delay": "sensor_delay",
     "models": "model",
     "rates": "frequencies",
@@ -41,6 +42,8 @@ REMEDIES = [
     ),
     (r"units=\{'?(\w+)'?: \.\.\.\}", r"--unit \1=...", "--unit"),
     (r"\bin parameters=", "by --fix", "--fix"),
+    (r"(?<!\S)units(?=: )", "--unit", "--unit"),
+    (r"(?<!\S)(time|drive|displacement)(?=: \S+ is (?:not a|the name of))", r"--\1", "--time"),
     (r"(?<!\S)train(?=: the window )", "--window", "--window"),
     (r"(?<!\S)test(?=: the window )", "--test-window", "--test-window"),
     (r"pt\.\w+\.from_um\(k[pq]=.*\)", "a value in V/um", "--kp"),

@@ -389,7 +389,7 @@ def test_the_command_judges_on_another_log_and_takes_files() -> None:
 
 REFUSED_COMMANDS: dict[str, tuple[str, ...]] = {
     "compare gone.csv": ("gone.csv: there is no such file",),
-    "compare log.csv --model jiles-atherton": ("log.csv: models has 'jiles-atherton'", "'dahl'"),
+    "compare log.csv --model jiles-atherton": ("log.csv: --model has 'jiles-atherton'", "'dahl'"),
     "compare log.csv --model gone.json": ("gone.json: no such file",),
     "compare log.csv --model log.json": ("log.json",),
     "compare log.csv --window 5": ("--window is '5'", "expected A:B"),
