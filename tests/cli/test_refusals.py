@@ -224,6 +224,10 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "compare log.csv --model nope": ("--model has 'nope'", "'dahl'"),
     "campaign log.csv --every 0": ("--every is 0 s", "more than 2 samples", "4"),
     "convert gone.csv log.csv": ("gone.csv: there is no such file",),
+    "identify log.csv --test moved.csv": ("moved.csv: the drive is in um: expected V", "log.csv"),
+    "compare log.csv --test moved.csv": ("moved.csv: the drive is in um: expected V", "log.csv"),
+    "watch . log.csv": ("is a directory: expected a file that piezotrack saved",),
+    "contour log.csv": ("log.csv: there is no column x_um", "'displacement_um'"),
     "simulate other.json log.csv": ("other.json is not a piezotrack model",),
     "simulate dahl.json gone.csv": ("gone.csv: there is no such file",),
     "simulate dahl.json log.csv --dt 0": ("log.csv", "dt is 0", "above 0"),
@@ -326,6 +330,7 @@ def test_refuses_a_bad_argument(command: str) -> None:
     pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010()).save("loop.json")
     write("bad.csv", "time_s,target_um\n0,1\n0.1,high\n")
     write("huge.csv", "time_s,voltage_V\n0,0\n1,-1e9\n2,0\n3,1e9\n")
+    write("moved.csv", log_text().replace("voltage_V", "command_um", 1))
     write_model()
     before = {path for path in Path().rglob("*") if path.is_file()}
     sentence = refusal(*command.split())

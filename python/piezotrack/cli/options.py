@@ -47,6 +47,7 @@ __all__ = [
     "column",
     "command_line",
     "cut",
+    "driven_alike",
     "in_order",
     "number",
     "of_file",
@@ -197,6 +198,17 @@ def cut(
         return log[slice(*window)]
     except ParameterError as error:
         raise error.of(f"{file.name}: {option} {_typed(window)}") from None
+
+
+def driven_alike(file: Path, log: Dataset, other: Path, unit: str) -> None:
+    """Refuse a log whose drive is in another unit than that of another file."""
+    from .._support.units import shown_unit
+
+    if log.drive_unit != unit:
+        raise ParameterError(
+            f"{file.name}: the drive is in {shown_unit(log.drive_unit)[0]}: expected "
+            f"{shown_unit(unit)[0]}, as that of {other.name}"
+        )
 
 
 def of_voltage(option: str, limits: tuple[float, float]) -> tuple[float, float]:
