@@ -194,6 +194,7 @@ def test_each_option_of_each_command_is_in_the_table_and_means_what_it_says() ->
     assert {option.opts[0] for _, option in OPTIONS} == set(ROWS)
     others = {other for _, option in OPTIONS for other in option.opts[1:]}
     assert others == {"-v", "-o"}
+    assert all("-o" in option.opts for _, option in OPTIONS if option.opts[0] == "--out")
 
 
 def test_no_meaning_has_two_names() -> None:
@@ -261,10 +262,14 @@ def test_the_second_unit_of_a_range_is_that_of_the_first() -> None:
         ("--window", "1s:", (1.0, None)),
         ("--limits", "0:75V", (0.0, 75.0)),
         ("--limits", "0:75000mV", (0.0, 75.0)),
+        ("--limits", "-.5:1.5V", (-0.5, 1.5)),
     ):
         kind = by_name[option].type
         assert isinstance(kind, Ranged)
-        assert kind.convert(text, by_name[option], None) == pytest.approx(pair)
+        for written in (text, text.replace(":", "..")):
+            assert kind.convert(written, by_name[option], None) == pytest.approx(pair)
+    with pytest.raises(pt.ParameterError, match=r"--limits is '0\.\.\.5V'"):
+        by_name["--limits"].type.convert("0...5V", by_name["--limits"], None)
 
 
 def test_the_help_fits_two_screens() -> None:

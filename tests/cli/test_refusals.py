@@ -70,6 +70,35 @@ def test_refuses_a_bad_log(name: str) -> None:
         assert refusal("identify", "log.csv", "--test", "bad.csv") == sentence
 
 
+@pytest.mark.parametrize(
+    ("wrong", "option", "value"),
+    [
+        (("--duration", "0.01"), "--duration", "0.01 s"),
+        (("--slew", "1V/s"), "--slew", "1 V/s"),
+        (("--limits", "3..0V"), "--limits", "(3, 0)"),
+        (("--rate", "1Hz"), "--duration", "4 s"),
+        (("--limits", "0:3um"), "--limits", "in um"),
+        (("--duration", "1e9s"), "--duration", "1e+09 s"),
+    ],
+)
+def test_suggest_blames_the_option_and_not_the_model(
+    wrong: tuple[str, ...], option: str, value: str
+) -> None:
+    write_model()
+    usual = ("--limits", "0:3V", "--slew", "20V/s", "--duration", "4s", "--rate", "200Hz")
+    sentence = refusal("suggest", "dahl.json", *usual, "--noise", "5nm", *wrong)
+    assert sentence.startswith(f"{option} ")
+    assert value in sentence
+    assert "dahl.json" not in sentence
+
+
+def test_a_file_is_named_once() -> None:
+    for command in ("noise", "identify", "step"):
+        sentence = refusal(command, "log.csv", "--window", "1000:")
+        assert sentence.count("log.csv") == 1
+        assert "--window" in sentence
+
+
 BAD_DRIVES = ("empty", "text", "infinity", "a short line", "a gap", "an unknown unit", "binary")
 
 
@@ -104,6 +133,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
         "(0.2, 0.1)",
         "lower one first",
     ),
+    "identify log.csv --model dahl --bound mass=0.2..0.1": ("(0.2, 0.1)", "lower one first"),
     "identify log.csv --bound mass=1": ("--bound", "'1'", "LOW:HIGH"),
     "identify log.csv --bound mass=a:b": ("--bound has 'a'", "number"),
     "identify log.csv --model dahl --prior mass=1": ("--prior", "'1'", "VALUE:WIDTH"),
@@ -124,6 +154,7 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "identify log.csv --model dahl --fix b0=nan": ("b0 is NaN", "finite"),
     "identify log.csv --sensor-delay -1": ("delay is -1 s", "0 s or above"),
     "identify log.csv --sensor-delay 5s:1s": ("delay is (5, 1) s", "the lower bound first"),
+    "identify log.csv --sensor-delay 5s..1s": ("delay is (5, 1) s", "the lower bound first"),
     "identify log.csv --sensor-delay late": (
         "--sensor-delay has 'late'",
         "fit, a time as 2ms, or bounds",
@@ -171,6 +202,32 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "identify log.csv log.csv --test-window 1:2": ("--test-window", "--test"),
     "simulate gone.json log.csv": ("gone.json: no such file",),
     "simulate log.csv log.csv": ("log.csv:1: not JSON",),
+    "simulate log.csv dahl.json": ("log.csv and dahl.json are the wrong way round",),
+    "watch log.csv dahl.json": ("log.csv and dahl.json are the wrong way round",),
+    "feedforward sine:1Hz,0..5um dahl.json": ("are the wrong way round", "MODEL REFERENCE"),
+    "feedforward dahl.json sine:1Hz,0..5um --dt 20ms --limits nan:2": (
+        "--limits are (nan, 2) V",
+        "finite",
+    ),
+    "feedforward dahl.json sine:1Hz,0..5um --dt 20ms --limits 0..inf": ("--limits are (0, inf) V",),
+    "feedforward dahl.json sine:1Hz,0..5um --dt 20ms --limits 2:2": ("--limits are (2, 2) V",),
+    "feedforward dahl.json sine:1Hz,0..5um --limits 0:9 --rate 1Hz": ("--rate", "0.5 s"),
+    "feedforward dahl.json 0..5um,1Hz": ("'0..5um,1Hz' is neither a file", "sine:0.2Hz,0..110um"),
+    "identify log.csv --unit volts=V": ("log.csv: --unit: 'volts'", "'voltage_V'"),
+    "info log.csv --displacement 7": ("log.csv: --displacement: 7", "'voltage_V'"),
+    "identify log.csv --model prandtl-ishlinskii --creep 0": ("--creep[0] is 0 s", "above 0"),
+    "identify log.csv --rate 200V": ("--rate has '200V'", "a frequency, as 200Hz"),
+    "identify log.csv --window 3um:5um": ("--window has '5um'", "a time, as 2s"),
+    "identify log.csv --fix mass=1": ("--fix has no effect", "expected the model", "--model dahl"),
+    "compare log.csv --window 7:3": ("log.csv: --window", "7 s to 3 s"),
+    "compare log.csv --test-window 8:9": ("log.csv: --test-window", "8 s to 9 s"),
+    "compare log.csv --model nope": ("--model has 'nope'", "'dahl'"),
+    "campaign log.csv --every 0": ("--every is 0 s", "more than 2 samples", "4"),
+    "convert gone.csv log.csv": ("gone.csv: there is no such file",),
+    "identify log.csv --test moved.csv": ("moved.csv: the drive is in um: expected V", "log.csv"),
+    "compare log.csv --test moved.csv": ("moved.csv: the drive is in um: expected V", "log.csv"),
+    "watch . log.csv": ("is a directory: expected a file that piezotrack saved",),
+    "contour log.csv": ("log.csv: there is no column x_um", "'displacement_um'"),
     "simulate other.json log.csv": ("other.json is not a piezotrack model",),
     "simulate dahl.json gone.csv": ("gone.csv: there is no such file",),
     "simulate dahl.json log.csv --dt 0": ("log.csv", "dt is 0", "above 0"),
@@ -181,10 +238,10 @@ BAD_ARGUMENTS: dict[str, tuple[str, ...]] = {
     "benchmark log.csv --json --quiet": ("--json and --quiet", "at most"),
     "benchmark gone.csv": ("gone.csv: there is no such file",),
     "benchmark log.csv --dt 0": ("log.csv", "dt is 0", "above 0"),
-    "benchmark log.csv --model unknown": ("models has 'unknown'", "'auto', 'dahl'"),
+    "benchmark log.csv --model unknown": ("--model has 'unknown'", "'auto', 'dahl'"),
     "benchmark --record unknown": ("records has 'unknown'", "'measured'"),
     "benchmark --list gone.txt": ("--list: gone.txt cannot be read",),
-    "benchmark log.csv --window 3:1": ("log.csv: train", "3 s to 1 s"),
+    "benchmark log.csv --window 3:1": ("log.csv: --window", "3 s to 1 s"),
     f"{TUNE} --out file": ("file cannot be made a folder",),
     f"{TUNE} --out file/sub": ("cannot be made a folder",),
     f"{TUNE} --json --quiet": ("--json and --quiet", "at most"),
@@ -273,6 +330,7 @@ def test_refuses_a_bad_argument(command: str) -> None:
     pt.Controller(dt=0.02, limits=(0.0, 75.0), feedback=pt.Pid.xu_li_2010()).save("loop.json")
     write("bad.csv", "time_s,target_um\n0,1\n0.1,high\n")
     write("huge.csv", "time_s,voltage_V\n0,0\n1,-1e9\n2,0\n3,1e9\n")
+    write("moved.csv", log_text().replace("voltage_V", "command_um", 1))
     write_model()
     before = {path for path in Path().rglob("*") if path.is_file()}
     sentence = refusal(*command.split())

@@ -255,7 +255,8 @@ def test_every_reference_has_figures_words_and_pictures(name: str) -> None:
 def test_the_summary_tells_the_run() -> None:
     lines = fig_12("FF FB").summary().splitlines()
     assert lines[0] == (
-        "Reference(sine 0.2 Hz, 0 to 110 um, 20 s) at 50 Hz; feedforward: table of period 2"
+        "Reference(sine 0.2 Hz, 0 to 110 um, 20 s) at 50 Hz; "
+        "feedforward: voltages of period 2, repeated"
     )
     assert lines[1].startswith("from 5 s on: max ")
     assert "phase lag" in lines[1]

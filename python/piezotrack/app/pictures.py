@@ -6,7 +6,7 @@ import re
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from .._support.display.look import figure_style, look
+from .._support.display.look import look, looking
 from .._support.files.writing import save_figures
 from .._support.messages import quoted
 from ..errors import ParameterError
@@ -120,6 +120,6 @@ def picture(desk: Desk, page: Callable[[Desk], Iterable[Part]], name: str) -> Do
     chart = charts[name]
     if name in zoom:
         chart = {**chart, "view": zoom[name]}
-    with drawing, figure_style("paper", width=f"{use.width}mm", formats=[use.picture]):
+    with drawing, looking("paper", f"{use.width}mm", [use.picture]):
         (path,) = save_figures({name: _figure(chart)}, desk.place("picture"))
     return Download(path.name, path.read_bytes())

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 from contextvars import ContextVar
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import click
+import click
 
 __all__ = ["as_options", "command_at_work"]
 
 # Arguments whose option has another name.
 OPTIONS = {
+    "creep_times": "creep",
     "delay": "sensor_delay",
+    "models": "model",
     "rates": "frequencies",
+    "seconds": "duration",
     "searches": "runs",
     "count": "plays",
     "dead_zones": "asymmetry",
@@ -41,6 +42,10 @@ REMEDIES = [
     ),
     (r"units=\{'?(\w+)'?: \.\.\.\}", r"--unit \1=...", "--unit"),
     (r"\bin parameters=", "by --fix", "--fix"),
+    (r"(?<!\S)units(?=: )", "--unit", "--unit"),
+    (r"(?<!\S)(time|drive|displacement)(?=: \S+ is (?:not a|the name of))", r"--\1", "--time"),
+    (r"(?<!\S)train(?=: the window )", "--window", "--window"),
+    (r"(?<!\S)test(?=: the window )", "--test-window", "--test-window"),
     (r"pt\.\w+\.from_um\(k[pq]=.*\)", "a value in V/um", "--kp"),
     (r"\bmissing='(drop|fill)'", r"--missing \1", "--missing"),
     (r"\bcreep=False", "--creep none", "--creep"),
@@ -81,6 +86,8 @@ def as_options(error: object) -> str:
 
     text, argument = str(error), getattr(error, "argument", None) or ""
     if (option := _option(argument, known)) in known:
+        if option == "--dt" and _has_rate():
+            option = "--rate: the interval"
         text = re.sub(rf"(^|: ){re.escape(argument)}(?=[ [])", rf"\1{option}", text, count=1)
     if not known & {"--displacement", "--drive"}:
         for python, words in IN_THE_HEADER:
@@ -99,6 +106,12 @@ def as_options(error: object) -> str:
     text = ARGUMENT.sub(in_options, text)
     # An option at the end of a sentence or before a comma.
     return re.sub(r"(--[a-z-]+) (?=[,;:)\n]|\.(?:\s|$)|$)", r"\1", text)
+
+
+def _has_rate() -> bool:
+    """Whether the interval was given as a rate."""
+    context = click.get_current_context(silent=True)
+    return context is not None and context.params.get("rate") is not None
 
 
 def _option(argument: str, known: set[str]) -> str:

@@ -230,7 +230,9 @@ def given(*names: str) -> list[str]:
     ]
 
 
-def refuse_without_effect(options: Iterable[str], reason: str) -> None:
+def refuse_without_effect(
+    options: Iterable[str], reason: str, expected: str = "it left out"
+) -> None:
     """Refuse options that were given although they have no effect; `reason` says beside what."""
     for option in given(*options):
-        raise ParameterError(option, f"no effect {reason}", "it left out", verb="has")
+        raise ParameterError(option, f"no effect {reason}", expected, verb="has")

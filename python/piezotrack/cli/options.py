@@ -11,7 +11,7 @@ import click
 
 from ..errors import ParameterError, PiezotrackError
 from .command import Argument, Option
-from .values import DRIVE, FREQUENCY, LENGTH, LOOP_TIME, TIME, VOLTAGE, Ranged
+from .values import DRIVE, FREQUENCY, LENGTH, LOOP_TIME, TIME, VOLTAGE, Ranged, named
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -47,6 +47,8 @@ __all__ = [
     "column",
     "command_line",
     "cut",
+    "driven_alike",
+    "in_order",
     "number",
     "of_file",
     "of_voltage",
@@ -158,12 +160,29 @@ def _typed(value: object) -> str:
 
 
 @contextmanager
-def of_file(file: Path) -> Iterator[None]:
-    """Put the name of the file before the message of an error."""
+def of_file(file: Path, *, options: tuple[str, ...] = ()) -> Iterator[None]:
+    """Put the name of the file before the message of an error, once.
+
+    Errors of arguments that are `options`, and of no file, stay as they are.
+    """
     try:
         yield
     except PiezotrackError as error:
+        if getattr(error, "argument", None) in options or str(error).startswith(f"{file.name}:"):
+            raise
         raise error.of(file.name) from None
+
+
+def in_order(model: Path, other: str | Path) -> None:
+    """Refuse a model file behind the log or the motion that belongs behind it."""
+    behind = Path(other)
+    if behind.suffix == ".json" != model.suffix and behind.is_file():
+        context = click.get_current_context()
+        names = [named(one) for one in context.command.params if isinstance(one, click.Argument)]
+        raise ParameterError(
+            f"{model} and {behind.name} are the wrong way round: expected {' '.join(names)}, "
+            "the model file first"
+        )
 
 
 def cut(
@@ -179,6 +198,17 @@ def cut(
         return log[slice(*window)]
     except ParameterError as error:
         raise error.of(f"{file.name}: {option} {_typed(window)}") from None
+
+
+def driven_alike(file: Path, log: Dataset, other: Path, unit: str) -> None:
+    """Refuse a log whose drive is in another unit than that of another file."""
+    from .._support.units import shown_unit
+
+    if log.drive_unit != unit:
+        raise ParameterError(
+            f"{file.name}: the drive is in {shown_unit(log.drive_unit)[0]}: expected "
+            f"{shown_unit(unit)[0]}, as that of {other.name}"
+        )
 
 
 def of_voltage(option: str, limits: tuple[float, float]) -> tuple[float, float]:

@@ -23,8 +23,10 @@ if TYPE_CHECKING:
 
     from .._support.display.look import Style
 
-__all__ = ["Output", "Printing", "can_be_folder", "print_words", "wrapped"]
+__all__ = ["OUT", "Output", "Printing", "can_be_folder", "print_words", "wrapped"]
 
+# Names of the option of the folder, in every command that has it.
+OUT = ("--out", "-o")
 # Formats of pictures.
 FORMATS = ("png", "svg", "pdf")
 # Lines that a command prints at most without -v.
@@ -86,7 +88,7 @@ class Output(Printing):
         Option(
             "Folder for the results, or a file for that of its ending",
             metavar="PATH",
-            names=("--out", "-o"),
+            names=OUT,
         ),
     ] = Path("results")
     overwrite: Annotated[bool, Option("Replace results that exist")] = False
@@ -161,10 +163,10 @@ class Output(Printing):
 
     def _style(self) -> AbstractContextManager[None]:
         """Draw and save pictures as the options say."""
-        from .._support.display.look import figure_style
+        from .._support.display.look import looking
 
         style: Style | None = None if self.width is None else "paper"
-        return figure_style(style, width=self.width, formats=self.formats)
+        return looking(style, self.width, self.formats)
 
     def _formatted(self, name: str) -> list[str]:
         """Return the files that a picture becomes, of its usual formats."""

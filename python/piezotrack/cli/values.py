@@ -44,6 +44,7 @@ __all__ = [
     "named",
     "nearest",
     "numbers",
+    "parted",
 ]
 
 BARE = re.compile(r"[-+.\deE]+")
@@ -122,7 +123,8 @@ class Quantity(ParamType):
             return Number.of(number * self.units[unit], unit)
         known = (OTHER_UNITS.get(unit) or lookup(unit)) if self.quantity else None
         if known is None or known.quantity != self.quantity:
-            raise ParameterError(option, f"'{text}'", self._expected, verb="has")
+            wanted = f"a {self.quantity}, {self.example}" if self.quantity else self._expected
+            raise ParameterError(option, f"'{text}'", wanted, verb="has")
         return Number.of(number * known.factor / known.divisor, known.name)
 
     @property
@@ -166,7 +168,7 @@ DRIVE = Quantity(
 
 @dataclass(frozen=True, eq=False)
 class Ranged(ParamType):
-    """Two numbers A:B of a quantity; a bare first one has the unit of the second.
+    """Two numbers A:B or A..B of a quantity; a bare first one has the unit of the second.
 
     Parameters
     ----------
@@ -191,8 +193,8 @@ class Ranged(ParamType):
 
     def parse(self, option: str, text: str) -> tuple[Number | None, Number | None]:
         """Parse the two numbers."""
-        first, colon, last = text.partition(":")
-        if not colon or (not self.open and not (first and last)):
+        first, mark, last = parted(text)
+        if not mark or (not self.open and not (first and last)):
             raise ParameterError(option, f"'{text}'", f"{self.name}, {self._example}")
         high = self.of.parse(option, last) if last else None
         if first and high is not None and high.unit and BARE.fullmatch(first):
@@ -279,6 +281,14 @@ def numbers(option: str, text: str, of: Quantity) -> list[Number]:
     parts = [part.strip() for part in text.split(",")]
     unit = of.parse(option, parts[-1]).unit
     return [of.parse(option, part + unit if BARE.fullmatch(part) else part) for part in parts]
+
+
+def parted(text: str) -> tuple[str, str, str]:
+    """Part a range A:B or A..B as `str.partition` does; without either the mark is empty."""
+    # Of three dots one may belong to a number.
+    mark = ":" if ":" in text or "..." in text else ".."
+    first, found, last = text.partition(mark)
+    return first.strip(), found, last.strip()
 
 
 def named(param: click.Parameter | None) -> str:

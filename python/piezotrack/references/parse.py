@@ -126,8 +126,8 @@ MISSING = {"low": "range", "start": "range", "start_frequency": "frequencies"}
 
 # Written so that each letter has one meaning: the time is linear in the length of a text.
 _VALUE = re.compile(r"([+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d_]*)")
-# A range written with a dash.
-_RANGE = re.compile(r"\s*\d+(?:\.\d*)?\s*-\s*\d")
+# A range written with a dash or a colon.
+_RANGE = re.compile(r"\s*\d+(?:\.\d*)?\s*(?:[^\W\d_]+\s*)?[-:]\s*\d")
 # Longest text: more than the longest path of a file.
 MOST_LETTERS = 10_000
 
@@ -253,7 +253,8 @@ def made_from_text(
     if kind is None or (is_there and not colon):
         # A colon after one letter belongs to a drive of Windows.
         is_path = not colon or len(name) == 1
-        if is_there or (is_path and Path(text).suffix):
+        # What follows the last dot of a range is a number.
+        if is_there or (is_path and Path(text).suffix[1:2].isalpha()):
             return read(text, duration=duration)
         raise ParameterError(
             f"{what} {quoted(text)}",
@@ -296,11 +297,20 @@ def _values(kind: Kind, text: str) -> dict[str, Any]:
         if names is None:
             problem = "has no unit" if quantity == "number" else "has no place here"
             raise ParameterError(f"{quoted(item)} {problem}: {kind.expected}")
+        if names == ("low", "high") and not numbers[0] < numbers[1]:
+            low, high = _as_written(written)
+            raise ParameterError("low", low, f"less than high, {high}")
         for name, number in zip(names, [numbers] if names[0] in LISTS else numbers, strict=True):
             if name in values:
                 raise ParameterError(f"{quoted(item)} gives {name} a second time: {kind.expected}")
             values[name] = number
     return values
+
+
+def _as_written(text: str) -> list[str]:
+    """Write each value of a range as it was typed, with its unit."""
+    found = _VALUE.findall(text.replace("..", " "))
+    return [f"{number} {unit or found[-1][1]}" for number, unit in found]
 
 
 def numbers_with_unit(text: str) -> tuple[list[float], str, str]:

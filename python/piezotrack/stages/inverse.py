@@ -279,7 +279,7 @@ class Inverse:
         volts[head:] = np.interp(
             after - turns * period / dt, np.arange(head + 1), volts[: head + 1]
         )
-        return PlayedVoltage(volts, f"feedforward: table of period {before + 1}")
+        return PlayedVoltage(volts, f"feedforward: voltages of period {before + 1}, repeated")
 
     def _settled(self, reference: Reference, period: float) -> int:
         """Periods before the one of the table: `settle`, or those of the smooth start if more."""

@@ -204,7 +204,7 @@ def test_feedforward_writes_the_table_that_python_computes() -> None:
     volts = fitted().inverse().played(sine(0.5, 6.0), 0.02)[0]
     assert np.allclose(rows["voltage_V"], volts, rtol=1e-9, atol=1e-9)
     assert np.allclose(rows["displacement_um"], 1e6 * sine(0.5, 6.0).sample(0.02).x, atol=1e-9)
-    assert "feedforward: table of period" in printed
+    assert "feedforward: voltages of period" in printed
     assert "300 samples" in printed
 
 

@@ -49,7 +49,7 @@ def test_many_logs_become_models_and_a_picture() -> None:
 
 def test_options_of_identify_and_seeds_reach_the_tasks() -> None:
     options = ("--runs", "1", "--history", "virgin", "--fix", "a1=122", "--window", "1:5")
-    ran("campaign", "a.csv", "--model", "dahl", "--seeds", "3:5", *options, "--quiet")
+    ran("campaign", "a.csv", "--model", "dahl", "--seeds", "3..5", *options, "--quiet")
     campaign = pt.identification.Campaign.load("campaign")
     assert [one.seed for one in campaign] == [3, 4]
     fit = pt.identify(

@@ -81,7 +81,7 @@ def test_a_list_says_of_each_log_what_is_fitted() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--model", "dal"], "models has 'dal'"),
+        (["--model", "dal"], "--model has 'dal'"),
         (["--record", "none"], "records has 'none'"),
         (["--window", "1:2"], "--window has no effect without a FILE"),
         (["--dt", "0.1"], "--dt has no effect without a FILE or --list"),
@@ -91,7 +91,7 @@ def test_a_list_says_of_each_log_what_is_fitted() -> None:
         (["--list", "window.txt"], "window.txt:1: other-window has no effect without other="),
         (["log.csv", "log.csv"], "records has log.csv twice"),
         (["log.csv", "--window", "3"], "--window is '3'"),
-        (["log.csv", "--window", "30:40"], "log.csv: train"),
+        (["log.csv", "--window", "30:40"], "log.csv: --window"),
         (["gone.csv"], "gone.csv: there is no such file"),
         (["--json", "--quiet"], "--json and --quiet"),
         (["log.csv", "--model", "discrete-backlash"], "no model was found of any record"),

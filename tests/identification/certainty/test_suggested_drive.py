@@ -148,6 +148,20 @@ def test_deviations_are_those_of_the_sensitivities_with_the_offset_projected_out
     np.testing.assert_allclose(relative(drive), np.sqrt(np.diagonal(covariance)), rtol=2e-3)
 
 
+def test_the_picture_has_the_parameters_that_are_determined_best() -> None:
+    shares = np.random.default_rng(5).permutation(np.geomspace(1e-3, 4.0, 36))
+    parameters = {
+        f"weights[{k}]": pt.identification.ExpectedDeviation(1e-6, "m/V", 1e-6 * share, np.inf)
+        for k, share in enumerate(shares)
+    }
+    drive = pt.identification.SuggestedDrive(
+        u=np.linspace(0.0, 3.0, 100), dt=DT, limits=(0.0, 3.0), slew=SLEW, blocks=("ramp",),
+        sine=np.zeros(100), parameters=parameters, noise=NOISE, drive_unit="V", seed=0, notes=(),
+    )  # fmt: skip
+    rows = [one.get_text() for one in drive.plot().axes[1].get_yticklabels()]
+    assert rows == [f"weights[{k}]" for k in sorted(np.argsort(shares)[:12])]
+
+
 def test_the_same_seed_gives_the_same_bits() -> None:
     first, again = (suggested(PLAYS, seconds=0.5) for _ in range(2))
     np.testing.assert_array_equal(first.u, again.u)

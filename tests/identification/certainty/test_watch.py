@@ -93,6 +93,32 @@ def test_a_slow_record_does_not_judge_the_mode() -> None:
     assert health["gain"].verdict == "unchanged"
 
 
+def test_a_change_that_could_not_be_seen_is_not_called_unchanged() -> None:
+    health = pt.watch(model_watched(), watched(22, top=55.0))
+    gain, lag = health["gain"], health["lag"]
+    for one in (gain, lag):
+        assert one.verdict == "unchanged"
+        assert one.detectable == pytest.approx(0.5 * np.ptp(one.interval or (0.0, 0.0)))
+    assert not gain.reason
+    assert lag.detectable is not None
+    assert lag.detectable > 0.1
+    assert f"{100.0 * lag.detectable:.2g} %" in lag.reason
+    entry = next(one for one in health.document()["changes"] if one["name"] == "lag")
+    assert entry["detectable"] == lag.detectable
+    rows = {line.partition(" ")[0]: line for line in health.summary().splitlines()}
+    assert "unchanged" in rows["gain"]
+    assert "unchanged" not in rows["lag"]
+    assert lag.reason in rows["lag"]
+
+
+def test_a_sensor_without_noise_is_judged_too() -> None:
+    log = watched(31)
+    health = pt.watch(model_watched(), pt.Dataset(u=log.u, y=np.full(log.u.size, 2e-6), dt=DT))
+    assert health["noise"].value == 0.0
+    assert health["noise"].verdict == "changed"
+    assert health["noise"].detectable is None
+
+
 def test_a_small_drive_does_not_judge_the_loop() -> None:
     health = pt.watch(model_watched(), watched(8, top=9.0))
     assert {health[one].verdict for one in ("gain", "hysteresis")} == {"not judged"}

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from piezotrack.identification.fitted.notes import start_notes
+from piezotrack.identification.fitted.start import Start
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -65,6 +67,16 @@ def test_the_voltage_of_rest_is_found() -> None:
     assert fit.start.history == "rest"
     assert fit.start.voltage == pytest.approx(90.0, abs=2.0)
     assert fit.cost < 1.1 * NOISE
+
+
+@pytest.mark.parametrize(("first", "told"), [(0.0018, False), (0.5, False), (20.0, True)])
+def test_a_small_step_to_the_first_sample_is_no_jump(first: float, told: bool) -> None:
+    u = first + 37.5 * (1.0 - np.cos(6.0 * np.pi * T))
+    start = Start(history="rest", state=STAGE.equilibrium(0.0), voltage=0.0, record="")
+    note = start_notes(start, pt.Dataset(u=u, y=1e-6 * u, dt=DT))
+    assert note is not None
+    assert "0 V" in note
+    assert (f"{first:g} V" in note) == told
 
 
 def test_a_searched_model_begins_at_rest_too() -> None:

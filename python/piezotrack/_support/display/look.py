@@ -32,6 +32,7 @@ __all__ = [
     "drawing",
     "figure_style",
     "look",
+    "looking",
     "without_glyph_warnings",
 ]
 
@@ -140,6 +141,9 @@ def figure_style(
 ) -> Iterator[None]:
     """Draw and save all pictures within a ``with`` block in one style.
 
+    Figures that are made in it with Matplotlib have a constrained layout, which leaves room for
+    their labels.
+
     Parameters
     ----------
     style : {"screen", "paper"}, optional
@@ -170,6 +174,17 @@ def figure_style(
     >>> float((25.4 * figure.get_size_inches()[0]).round(1))
     85.0
     """
+    import matplotlib as mpl
+
+    with looking(style, width, formats), mpl.rc_context({"figure.constrained_layout.use": True}):
+        yield
+
+
+@contextmanager
+def looking(
+    style: Style | None, width: Width | None, formats: str | Sequence[str] | None = None
+) -> Iterator[None]:
+    """Draw and save the pictures of the package in one style, as of `figure_style`."""
     token = _LOOK.set(look().changed(style, width, formats))
     try:
         yield
@@ -211,7 +226,7 @@ def drawing(view: Callable[P, R]) -> Callable[P, R]:
             return view(*args, **options)
         token, chosen = _INSIDE.set(True), CHOSEN.set(panel)
         try:
-            with figure_style(style, width=width), mpl.rc_context(look().settings):
+            with looking(style, width), mpl.rc_context(look().settings):
                 before = parts_of([*args, *options.values(), panel and panel.ax])
                 drawn: Any = view(*args, **options)
                 drawn = panel.ax if panel else drawn

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -147,6 +148,12 @@ def _path(text: str, motion: Motion, loop: FeedbackOptions, place: dict[str, Any
     dt = interval(loop.dt, loop.rate) if Path(text).is_file() else None
     try:
         return path_of(text, **options)
+    except ParameterError as error:
+        # Here --displacement does not belong to the path either.
+        words = re.sub(
+            r"displacement: '(.)' is not a column", r"there is no column \1_um", str(error)
+        )
+        raise error if words == str(error) else ParameterError(words) from None
     except DataError as error:
         if dt is not None and "dt=" in str(error):
             return path_of(text, dt=dt, **options)

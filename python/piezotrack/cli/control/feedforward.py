@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..command import command
 from ..option_groups import Motion
-from ..options import ModelFile, Reference, Zero
+from ..options import ModelFile, Reference, Zero, in_order
 from ..output import Output
 from .loop_options import BeyondReach, LoopOptions, Online, known_model, zero_words
 
@@ -43,6 +43,7 @@ def feedforward_command(
     from ...control.plant import plant_of
     from ...control.views.tracking_plot import plot_feedforward
 
+    in_order(model, reference)
     known = known_model(model, zero=zero)
     desired = motion.of(reference)
     interval = loop.interval(known, desired)

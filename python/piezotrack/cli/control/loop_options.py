@@ -102,6 +102,13 @@ class LoopOptions:
             for one in self.limits:
                 _check_unit("--limits", one, name)
             low, high = (float(one) / scale for one in self.limits)
+            if not -math.inf < low < high < math.inf:
+                raise ParameterError(
+                    "--limits",
+                    f"({scale * low:g}, {scale * high:g}) {name}",
+                    "two finite numbers, the lower one first",
+                    verb="are",
+                )
             return low, high
         known = model.drive_range if own and model else PAPER_LIMITS
         if known is None:

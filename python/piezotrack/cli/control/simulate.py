@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from ...errors import DataError, ParameterError
 from ..command import Argument, Option, command
 from ..option_groups import DriveColumns
-from ..options import ModelFile, of_file
+from ..options import ModelFile, Zero, in_order, of_file
 from ..output import Output
+from .loop_options import known_model, zero_words
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,6 +30,7 @@ def simulate_command(
     hold: Annotated[
         Literal["foh", "zoh"], Option("Drive between samples: linear, constant")
     ] = "foh",
+    zero: Zero = False,
     output: Output,
 ) -> None:
     """Simulate the response of a model to the drive of a log."""
@@ -40,10 +42,10 @@ def simulate_command(
     )
     from ..._support.units import drive_word, shown_unit
     from ...data.reader import drive_dataset
-    from ...identification.fitted.model_file import load
     from ...identification.views.plot import plot_response
 
-    known = load(model)
+    in_order(model, log)
+    known = known_model(model, zero=zero)
     record = drive_dataset(log, **columns.arguments)
     name, scale = shown_unit(known.drive_unit)
     if record.drive_unit != known.drive_unit and "m" in (record.drive_unit, known.drive_unit):
@@ -78,7 +80,7 @@ def simulate_command(
     words = (
         f"{t.size} samples from rest at {scale * u[0]:.4g} {name}, drive from "
         f"{scale * u.min():.4g} to {scale * u.max():.4g} {name}: displacement "
-        f"from {1e6 * x.min():.4g} to {1e6 * x.max():.4g} um"
+        f"from {1e6 * x.min():.4g} to {1e6 * x.max():.4g} um{zero_words(known)}"
     )
     document = {
         "samples": t.size,

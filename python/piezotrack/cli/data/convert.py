@@ -30,7 +30,8 @@ def convert_command(
     from ...data.log_file import format_to_write
 
     format_to_write(to)
-    if to.exists() and not overwrite:
+    # A log that is missing may be due to names the wrong way round.
+    if file.exists() and to.exists() and not overwrite:
         raise ParameterError(f"{to} exists: expected --overwrite, or another name")
     log = reading.log(file)
     words = f"{len(log)} samples, {log.duration:.6g} s at {1.0 / log.dt:.6g} Hz"

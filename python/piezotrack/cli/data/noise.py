@@ -22,8 +22,8 @@ def noise_command(
     from ...data.reader import read_displacement
     from ...identification.experiments.sensor_noise import identify_noise
 
-    log = read_displacement(file, **columns.arguments)
+    part = cut(read_displacement(file, **columns.arguments), file, window)
     output.will_write(["noise.json", *picture_files("noise")])
     with of_file(file):
-        found = identify_noise(cut(log, file, window))
+        found = identify_noise(part)
     output.show(found.summary(), found.document(), output.write(found.save))

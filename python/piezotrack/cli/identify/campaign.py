@@ -11,9 +11,9 @@ from ...errors import DataError, Interrupted, ParameterError
 from ..command import Argument, Option, command, refuse_without_effect
 from ..option_groups import LogOptions
 from ..options import WINDOW, Threads, cut
-from ..output import Printing, can_be_folder
+from ..output import OUT, Printing, can_be_folder
 from ..process.interruption import acknowledge_interrupt
-from ..values import TIME
+from ..values import TIME, parted
 from .fit_options import (
     FitOptions,
     Kinds,
@@ -64,7 +64,11 @@ def campaign_command(
     parameters: ParameterOptions,
     out: Annotated[
         Path,
-        Option("Folder for the results; those that it has are not computed again", metavar="PATH"),
+        Option(
+            "Folder for the results; those that it has are not computed again",
+            metavar="PATH",
+            names=OUT,
+        ),
     ] = Path("campaign"),
     printing: Printing,
 ) -> None:
@@ -121,7 +125,10 @@ def _pieces(
         return {title if window is None else f"{title} {begin:.6g} to {end:.6g} s": log}
     if not 2.0 * log.dt < every <= end - begin + log.dt:
         raise ParameterError(
-            "--every", f"{every:g} s", f"at most the length of {title}, {end - begin:.6g} s"
+            "--every",
+            f"{every:g} s",
+            f"more than 2 samples of {title}, {2.0 * log.dt:.6g} s, and at most its length, "
+            f"{end - begin:.6g} s",
         )
     count = int((end - begin + 1.5 * log.dt) / every)
     starts = [begin + k * every for k in range(count)]
@@ -144,9 +151,9 @@ def _titles(files: list[Path]) -> dict[str, Path]:
 
 def _seeds(text: str) -> range:
     """Parse N or A:B."""
-    first, colon, last = text.rpartition(":")
+    first, mark, last = parted(text)
     try:
-        seeds = range(int(first) if colon else 0, int(last))
+        seeds = range(int(first), int(last)) if mark else range(int(text))
     except ValueError:
         seeds = range(0)
     if not seeds or seeds.start < 0:

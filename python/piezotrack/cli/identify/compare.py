@@ -10,7 +10,17 @@ from ...errors import Interrupted
 from ..command import Option, command, refuse_without_effect
 from ..connection import with_what_is_kept
 from ..option_groups import LogOptions
-from ..options import LogFile, Seed, TestLog, TestWindow, Threads, Window, cut, of_file
+from ..options import (
+    LogFile,
+    Seed,
+    TestLog,
+    TestWindow,
+    Threads,
+    Window,
+    cut,
+    driven_alike,
+    of_file,
+)
 from ..output import Output
 from ..values import Names
 from .fit_options import listed
@@ -56,6 +66,8 @@ def compare_command(
         refuse_without_effect(("seed", "runs"), f"with {', '.join(model)}: none is searched")
     log = reading.log(file)
     second = None if test is None else cut(reading.log(test), test, test_window, "--test-window")
+    if test is not None and second is not None:
+        driven_alike(test, second, file, log.drive_unit)
     # A model file that is given is written as it is.
     given = {Path(name).resolve() for name in model or []}
     with of_file(file):

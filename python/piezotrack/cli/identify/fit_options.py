@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 from ...errors import ParameterError
 from ..command import Argument, Option, given, group, refuse_without_effect
 from ..options import number, pairs
-from ..values import LOOP_TIME, TIME, Names, Ranged, numbers
+from ..values import LOOP_TIME, TIME, Names, Ranged, numbers, parted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -109,13 +109,12 @@ class Kinds:
         """Refuse options that one of the models does not have; `fixed` are parameters."""
         for name in self.names:
             if name == AUTO:
-                reason = (
-                    "with --model auto: name the model whose parameters these are, as --model dahl"
-                )
-                refuse_without_effect(OF_ONE_MODEL, reason)
+                reason = "with --model auto"
+                expected = "the model whose parameters these are, as --model dahl"
+                refuse_without_effect(OF_ONE_MODEL, reason, expected)
                 # The one parameter that all models with a mass have.
                 if not set(fixed) <= {"stiffness"}:
-                    refuse_without_effect(("fix",), reason)
+                    refuse_without_effect(("fix",), reason, expected)
             elif not searched(name):
                 reason = f"with the model {name}, which is fitted by least squares"
                 refuse_without_effect(OF_SEARCH, reason)
@@ -361,8 +360,8 @@ def _prior(option: str, text: str) -> tuple[float, float]:
 
 
 def _bounds(option: str, text: str) -> tuple[float, float]:
-    low, colon, high = text.partition(":")
-    if not colon:
+    low, mark, high = parted(text)
+    if not mark:
         raise ParameterError(option, f"'{text}'", "LOW:HIGH", verb="has")
     return number(option, low), number(option, high)
 
@@ -401,7 +400,7 @@ def delay_asked(text: str | None) -> bool | float | tuple[float, float] | None:
     """Parse the delay of a log [s]."""
     if text is None or text in ("none", "fit"):
         return None if text is None else text == "fit"
-    if ":" in text:
+    if parted(text)[1]:
         low, high = Ranged(LOOP_TIME, "LOW:HIGH").parse("--sensor-delay", text)
         return low or 0.0, high or 0.0
     return _time("--sensor-delay", text, "none, fit, a time as 2ms, or bounds as 0:5ms")

@@ -11,7 +11,16 @@ from ..._support.display.progress_parts import Parts
 from ...errors import Interrupted, ParameterError
 from ..command import Option, command, refuse_without_effect
 from ..option_groups import LogOptions
-from ..options import TestLog, TestWindow, Threads, Windows, command_line, cut, of_file
+from ..options import (
+    TestLog,
+    TestWindow,
+    Threads,
+    Windows,
+    command_line,
+    cut,
+    driven_alike,
+    of_file,
+)
 from ..output import Output
 from ..process.interruption import acknowledge_interrupt
 from ..values import TIME
@@ -108,6 +117,7 @@ def identify_command(
     second = None
     if test is not None or test_window is not None:
         judging = whole[0] if test is None else reading.log(test)
+        driven_alike(test or files[0], judging, files[0], whole[0].drive_unit)
         second = cut(judging, test or files[0], test_window, "--test-window")
     records = _records(logs, sensor.of_each(len(logs)), weights)
     output.will_write(_files(kinds, logs, options, tested=second is not None))

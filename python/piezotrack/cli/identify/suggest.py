@@ -54,11 +54,12 @@ def suggest_command(
     if (dt := sampling.interval) is None:
         raise ParameterError("--dt", "missing", "a sampling interval, or a rate by --rate")
     known = load(model)
+    volts = of_voltage("--limits", limits)
     output.will_write(["suggested.csv", "suggested.json", *picture_files("suggested")])
-    with of_file(model):
+    with of_file(model, options=("limits", "slew", "seconds", "dt", "seed")):
         drive = suggest_drive(
             known,
-            limits=of_voltage("--limits", limits),
+            limits=volts,
             slew=slew,
             seconds=duration,
             dt=dt,

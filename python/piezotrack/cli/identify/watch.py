@@ -10,7 +10,7 @@ import click
 from ...errors import ParameterError
 from ..command import Option, command
 from ..option_groups import LogOptions
-from ..options import LogFile, ModelFile, Overwrite, Window, cut, of_file
+from ..options import LogFile, ModelFile, Overwrite, Window, cut, in_order, of_file
 from ..output import Printing, can_be_folder
 
 __all__ = ["CHANGED", "watch_command"]
@@ -44,6 +44,7 @@ def watch_command(
     from ...identification.fitted.model_file import load
     from ...identification.watching.watch import watch
 
+    in_order(model, file)
     known = load(model)
     if refit is not None:
         can_be_folder(refit.parent)

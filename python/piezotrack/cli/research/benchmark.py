@@ -10,7 +10,7 @@ from ...errors import DataError, ParameterError
 from ..command import Argument, Option, command, refuse_without_effect
 from ..option_groups import LogOptions
 from ..options import WINDOW, Overwrite, TestWindow, Window, cut, of_file
-from ..output import Printing, can_be_folder
+from ..output import OUT, Printing, can_be_folder
 
 if TYPE_CHECKING:
     from ...benchmarking.record import BenchmarkRecord
@@ -50,7 +50,11 @@ def benchmark_command(
     reading: LogOptions,
     out: Annotated[
         Path,
-        Option("Folder for the results; those that it has are not computed again", metavar="PATH"),
+        Option(
+            "Folder for the results; those that it has are not computed again",
+            metavar="PATH",
+            names=OUT,
+        ),
     ] = Path("benchmark"),
     overwrite: Overwrite = False,
     printing: Printing,

@@ -108,8 +108,9 @@ class Tuned(Result):
     unit : str
         Its unit: ``"m"``, of the effort ``"V"``.
     value : float
-        Its value, of the worst stage with the offset of the spread; without a reference the
-        integral of the error after a step disturbance of 1 V at the input of the stage [m s/V].
+        Its value, the largest over the stages tried, whose feedforward is off by ``offset`` of
+        `Spread`; without a reference the integral of the error after a step disturbance of 1 V at
+        the input of the stage [m s/V].
     runs : tuple of Tracking or of Contour
         Full simulations of the tuned loop on the first stage without an offset, one for each
         reference.

@@ -55,8 +55,8 @@ def tuned_text(tuned: Tuned) -> str:
         learns = any(one.repetitive is not None for one in tuned.controllers)
         after = "learning" if learns else "settling"
         lines.append(
-            f"{scale * tuned.value:.4g} {unit} after {after}, of the worst stage with the offset "
-            "of the spread"
+            f"{scale * tuned.value:.4g} {unit} after {after}, the largest over the stages tried, "
+            "with the error assumed of the feedforward"
         )
     word = "contour error " if len(gains) > 1 else ""
     for run in tuned.runs:

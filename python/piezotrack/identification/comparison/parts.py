@@ -61,6 +61,9 @@ def parts_of(log: Dataset, train: object, test: object) -> tuple[Dataset, Datase
                 verb="goes",
             )
         second = (first[1], None)
+    if train is None:
+        # What is given is refused before what follows from it.
+        _windowed("test", log, second)
     fitted, two = _windowed("train", log, first), _windowed("test", log, second)
     _check_apart(fitted, two)
     return fitted, two, True

@@ -282,6 +282,10 @@ def read_content(path: str | os.PathLike[str]) -> tuple[str, Any]:
         raise ParameterError("path", f"{path!r}", "the name of a file") from None
     try:
         content = file.read_bytes()
+    except IsADirectoryError:
+        raise DataError(
+            f"{file.name}: is a directory: expected a file that piezotrack saved"
+        ) from None
     except OSError as error:
         raise DataError(f"{file.name}: {(error.strerror or str(error)).lower()}") from None
     except ValueError as error:

@@ -43,6 +43,8 @@ LARGE = 0.05
 FIRST, CARRIED = 0.1, 0.5
 # Margin of the drive's range, and factor of its rate, beyond which a model was not fitted.
 MARGIN, FASTER = 0.01, 2.0
+# Share of the drive's range up to which its step to the first sample is none to speak of.
+JUMP = 0.01
 
 
 def fit_percent(rms: float, spread: float) -> float:
@@ -232,8 +234,9 @@ def start_notes(start: Start | None, data: Dataset) -> str | None:
     came_from = "" if other is None else f" of {drive_text(other, unit)}"
     if start.history == "rest":
         rest = drive_text(other or 0.0, unit)
-        to = drive_text(first, unit)
-        return f"at rest at {rest} until the drive jumped to its first sample, {to}"
+        if abs(first - (other or 0.0)) <= JUMP * float(np.ptp(data.full.u)):
+            return f"at rest at {rest}"
+        return f"at rest at {rest}, then a jump of the drive to {drive_text(first, unit)}"
     before = {
         "virgin": "never moved before",
         "settled": "settled under the record's own drive",

@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
     from ..fitted.identified_model import IdentifiedModel
 
-__all__ = ["Change", "Health", "Refit", "Verdict"]
+__all__ = ["RATIOS", "Change", "Health", "Refit", "Verdict"]
+
+# Changes that are ratios to what the model's own record has.
+RATIOS = ("residual", "noise")
 
 Verdict = Literal["unchanged", "changed", "not judged"]
 
@@ -39,7 +42,8 @@ class Change(NamedTuple):
     verdict : {"unchanged", "changed", "not judged"}
         Whether the interval leaves out the value of an unchanged stage.
     reason : str
-        Why it is not judged, or which other change would look the same; empty otherwise.
+        Why it is not judged, which other change would look the same, or, where no change is seen,
+        that only a large one could be; empty otherwise.
     """
 
     name: str
@@ -48,6 +52,20 @@ class Change(NamedTuple):
     unit: str
     verdict: Verdict
     reason: str = ""
+
+    @property
+    def detectable(self) -> float | None:
+        """Least change that the record shows, in `unit`; of residual and noise a ratio.
+
+        A smaller one leaves the verdict "unchanged". None where the change is not judged, and of a
+        ratio of 0.
+        """
+        if self.value is None or self.interval is None:
+            return None
+        low = self.interval[0]
+        if self.name not in RATIOS:
+            return self.value - low
+        return self.value / low if low > 0.0 else None
 
 
 class Refit(NamedTuple):
@@ -156,7 +174,7 @@ class Health(Result):
             "rms": {"value": self.rms, "unit": "m"},
             "rms_identified": {"value": self.rms_identified, "unit": "m"},
             "effective_samples": self.effective,
-            "changes": [one._asdict() for one in self.changes],
+            "changes": [one._asdict() | {"detectable": one.detectable} for one in self.changes],
             **refit,
             "provenance": {
                 "package": "piezotrack",

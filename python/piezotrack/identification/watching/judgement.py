@@ -14,7 +14,7 @@ from ..._support.statistics import sample_noise
 from ..confidence.sensitivity import fitted_values, sensitivity
 from ..fitted.start import begin, same_beginning, start_after, start_at_jump
 from .correlated import Autoregression
-from .health import Change
+from .health import RATIOS, Change
 from .known import Known
 from .motion import Motion
 
@@ -40,6 +40,8 @@ WRONG = 0.05
 # Half width of an interval beyond which a change is not judged: relative; of the delay in parts of
 # the rms of the motion that it makes, of the drift in parts of the stroke.
 WIDEST = {"gain": 0.1, "hysteresis": 0.5, "mode": 0.2, "lag": 1.0, "delay": 0.05, "drift": 0.05}
+# Least change that a record shows from which on "unchanged" alone would mislead: relative; a ratio.
+COARSE, COARSE_RATIO = 0.1, 2.0
 # Part of the range identified that the drive covers at least.
 COVERED = 0.2
 # Model error on another record, in those of the record identified: 3.2 seen on a measured stage.
@@ -263,7 +265,7 @@ class Judgement:
     def _judged(self, name: str, value: float, width: float) -> Change:
         interval = value - width, value + width
         verdict: Verdict = "unchanged" if interval[0] <= 0.0 <= interval[1] else "changed"
-        return Change(name, value, interval, UNITS.get(name, ""), verdict)
+        return _with_limit(Change(name, value, interval, UNITS.get(name, ""), verdict))
 
     def _with_alike(self, change: Change, reasons: dict[str, str]) -> Change:
         """Name the changes that would look the same as one that is judged."""
@@ -282,7 +284,7 @@ class Judgement:
         larger = math.hypot(noise, OTHER_RECORD * known.model_error) / known.rms
         interval = ratio * math.exp(-width) / larger, ratio * math.exp(width)
         verdict: Verdict = "changed" if interval[0] > 1.0 else "unchanged"
-        return Change("residual", ratio, interval, "", verdict)
+        return _with_limit(Change("residual", ratio, interval, "", verdict))
 
     def _noise(self, left: Array) -> Change:
         known = self.known
@@ -303,7 +305,19 @@ class Judgement:
         width = self.quantile(math.inf) * spread + math.log(OTHER_NOISE)
         interval = ratio * math.exp(-width), ratio * math.exp(width)
         verdict: Verdict = "unchanged" if interval[0] <= 1.0 <= interval[1] else "changed"
-        return Change("noise", ratio, interval, "", verdict)
+        return _with_limit(Change("noise", ratio, interval, "", verdict))
+
+
+def _with_limit(change: Change) -> Change:
+    """Say of a change that is not seen how large it may be, where that is much."""
+    least = change.detectable
+    if change.verdict != "unchanged" or change.unit or least is None:
+        return change
+    is_ratio = change.name in RATIOS
+    if least <= (COARSE_RATIO if is_ratio else COARSE):
+        return change
+    shown = f"x{least:.2g}" if is_ratio else f"{100.0 * least:.2g} %"
+    return change._replace(reason=f"less than {shown} could not be seen in this record")
 
 
 def _deviations(columns: Array, left: Array) -> Array:

@@ -37,6 +37,8 @@ __all__ = ["ExpectedDeviation", "SuggestedDrive", "suggest_drive"]
 NORMAL_95 = 1.959963984540054
 # Correlation of neighbouring residuals from which on they are not taken for independent.
 CORRELATED = 0.3
+# Samples of a drive at most: the response of the stage is computed for each parameter.
+MOST_SAMPLES = 1_000_000
 
 
 class ExpectedDeviation(NamedTuple):
@@ -260,6 +262,12 @@ def suggest_drive(
     if seconds < (shortest := COUNTS[0] * FEWEST * dt):
         raise ParameterError(
             "seconds", f"{seconds:g} s", f"{shortest:g} s or more at intervals of {dt:g} s"
+        )
+    if seconds > MOST_SAMPLES * dt:
+        raise ParameterError(
+            "seconds",
+            f"{seconds:g} s",
+            f"{MOST_SAMPLES * dt:g} s or less, {MOST_SAMPLES} intervals of {dt:g} s",
         )
     if slew * seconds < 4.0 * (high - low):
         raise ParameterError(

@@ -22,17 +22,23 @@ from ...._support.display.plot_style import (
 from ...._support.units import drive_word, length_text, shown_unit
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from matplotlib.figure import Figure, SubFigure
 
-    from ...confidence.suggestion.suggested_drive import SuggestedDrive
+    from ...confidence.suggestion.suggested_drive import ExpectedDeviation, SuggestedDrive
 
 __all__ = ["plot_suggested"]
+
+# Most parameters with a row of their own; the table has all.
+ROWS = 12
 
 
 @drawing
 def plot_suggested(drive: SuggestedDrive, fig: Figure | SubFigure | None = None) -> Figure:
-    """Plot a suggested drive, and the expected deviation of each parameter beside others."""
-    names = list(drive.parameters)
+    """Plot a suggested drive, and the expected deviations of the best determined parameters."""
+    shown = _best(drive.parameters)
+    names = list(shown)
     size = (11.0, max(4.4, 1.4 + 0.28 * len(names)))
     figure, axes = sheet(
         fig, size, (("drive", "deviations"),), widths=(1.5, 1.0), least=1.0 + 0.14 * len(names)
@@ -49,7 +55,7 @@ def plot_suggested(drive: SuggestedDrive, fig: Figure | SubFigure | None = None)
         ylabel=f"{drive_word(drive.drive_unit)} [{unit}]",
     )
     heading(left, "Suggested drive")
-    each = list(drive.parameters.values())
+    each = list(shown.values())
     series: list[tuple[str, str, str, list[float | None]]] = [
         ("suggested drive", "o", MODELS[0]["color"], [one.deviation for one in each]),
         ("plain sine", "s", MODELS[1]["color"], [one.of_sine for one in each]),
@@ -66,5 +72,18 @@ def plot_suggested(drive: SuggestedDrive, fig: Figure | SubFigure | None = None)
     right.invert_yaxis()
     right.grid(axis="y", color=GREY, linewidth=0.4)
     legend_inside(right, ncols=3)
-    heading(right, f"Expected under a noise of {length_text(drive.noise, 3)} rms")
+    total = len(drive.parameters)
+    what = "Expected" if len(names) == total else f"Best determined {len(names)} of {total},"
+    heading(right, f"{what} under a noise of {length_text(drive.noise, 3)} rms")
     return whole(figure)
+
+
+def _best(parameters: Mapping[str, ExpectedDeviation]) -> dict[str, ExpectedDeviation]:
+    """Return the parameters that the drive determines best, in their order."""
+
+    def share(name: str) -> float:
+        one = parameters[name]
+        return one.deviation / abs(one.value) if one.value else math.inf
+
+    best = set(sorted(parameters, key=share)[:ROWS])
+    return {name: one for name, one in parameters.items() if name in best}

@@ -17,6 +17,7 @@ from ...._support.display.plot_style import (
     whole,
 )
 from ...._support.units import length_text
+from ...watching.health import RATIOS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
@@ -27,7 +28,6 @@ __all__ = ["health_text", "plot_health"]
 
 # Scale, unit and sign of a change for a person.
 SHOWN = {"s": (1e3, " ms", "+.3g"), "m": (1e6, " um", "+.3g"), "": (100.0, " %", "+.3g")}
-RATIOS = ("residual", "noise")
 
 
 def health_text(health: Health) -> str:
@@ -44,7 +44,7 @@ def health_text(health: Health) -> str:
         Several lines.
     """
     changed = [one.name for one in health.changes if one.verdict == "changed"]
-    verdict = f"changed: {', '.join(changed)}" if changed else "unchanged, as far as judged"
+    verdict = f"changed: {', '.join(changed)}" if changed else _none_seen(health)
     lines = [
         f"{health.model} on {health.source or 'a record'}: {verdict}",
         f"  rms error  {length_text(health.rms, 3)}, on its own record "
@@ -69,8 +69,21 @@ def health_text(health: Health) -> str:
     return "\n".join(lines)
 
 
+def _is_coarse(change: Change) -> bool:
+    """Whether no change is seen, and only a large one could be."""
+    return change.verdict == "unchanged" and bool(change.reason)
+
+
+def _none_seen(health: Health) -> str:
+    # The residual is none of the stage's properties.
+    coarse = [one.name for one in health.changes[1:] if _is_coarse(one)]
+    if not coarse:
+        return "unchanged, as far as judged"
+    return f"no change seen; of {' and '.join(coarse)} only a large one could be"
+
+
 def _row(change: Change) -> str:
-    head = f"{change.name:<11} {change.verdict:<10}"
+    head = f"{change.name:<11} {'none seen' if _is_coarse(change) else change.verdict:<10}"
     if change.value is None or change.interval is None:
         return f"{head}  {change.reason}"
     ratio = change.name in RATIOS
@@ -106,7 +119,7 @@ def plot_health(health: Health, fig: Figure | SubFigure | None = None) -> Figure
     ax.set_ylim(len(health.changes) - 0.5, -0.5)
     ax.set_xlabel("change in half widths of its interval")
     source = f" on {literal(health.source)}" if health.source else ""
-    heading(ax, f"{health.model}{source}: {'unchanged' if health.healthy else 'changed'}")
+    heading(ax, f"{health.model}{source}: {_none_seen(health) if health.healthy else 'changed'}")
     return whole(figure)
 
 
