@@ -93,7 +93,8 @@ def identify(
     model : str, optional
         Name of the model. By default, ``"auto"``, those that suit the record are fitted to the
         first three fifths of the window and judged on the rest, and the best is fitted to all of
-        it and says so: `Identification.selection`. Searched are ``"dahl"`` (`DahlStage`),
+        it, others too where it leaves more than twice the noise: `Identification.selection`.
+        Searched are ``"dahl"`` (`DahlStage`),
         ``"bouc-wen"`` (`BoucWenStage`), ``"first-order-dahl"`` (`FirstOrderDahlStage`),
         ``"asymmetric-bouc-wen"`` (`AsymmetricBoucWenStage`), ``"lugre"`` (`LuGreStage`),
         ``"parallel-dahl"`` (`ParallelDahlStage`) and ``"bouc-wen-oscillator"``

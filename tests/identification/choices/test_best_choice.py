@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import sys
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import piezotrack as pt
 from folders import ROOT
 
 BENCH = ROOT / "benches" / "records" / "choices.py"
@@ -45,3 +47,16 @@ def test_hardly_a_choice_named_is_better_on_fifty_records() -> None:
     # Six are more than 3 % worse, one by half: modes that the chirp hardly excites.
     assert int(np.sum(ratios > 1.03)) <= 8
     assert ratios.max() < 2.0
+
+
+def test_a_model_that_fits_the_whole_record_far_better_is_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Of this record of ramps the first three fifths do not show what the rest does.
+    monkeypatch.syspath_prepend(str(BENCH.parent))
+    case = importlib.import_module("cases").make(1, 20)
+    data = pt.Dataset(u=case.u, y=case.y, dt=case.dt)
+    default = pt.identify(data)
+    assert default.selection is not None
+    named = pt.identify(data, "prandtl-ishlinskii")
+    assert default.cost < named.cost / 0.75

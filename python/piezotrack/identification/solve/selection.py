@@ -65,6 +65,9 @@ APART, CORRELATED, CHANCE = 10, 0.1, 4.0
 # Another model has to be better by this share than one before it in the list; where the record
 # has one loop, on which all are judged that were fitted to it, by more.
 BETTER, BETTER_ON_ONE_LOOP = 0.03, 0.1
+# One that leaves more than noise on the whole record gives way to one of so many others, the best
+# on what was not fitted, that leaves less by this share there; not to one of many weights.
+OTHERS, BETTER_ON_WHOLE, MANY_WEIGHTS = 3, 0.25, "preisach"
 # Blocks of the drive that differ by this ratio in amplitude or rate are judged apart.
 APART_IN_SIZE = 2.0
 # A drive repeats where periods of it differ by less than this share.
@@ -122,8 +125,17 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     if not trials.found:
         raise trials.refused or DataError("no model could be fitted")
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
+
+    def whole(info: ModelInfo) -> Identification:
+        return identify_model(trials.whole(problem, info), methods.method(info), run)
+
     with shares.begin(len(infos)):
-        fit = identify_model(trials.whole(problem, best.info), methods.method(best.info), run)
+        fit = whole(best.info)
+        if fit.cost > NEAR_NOISE * max(noise_of(record.data) for record in problem.records):
+            # The first part does not show all that the whole record does.
+            others = [whole(info) for info in trials.others(best)]
+            least = min(others, key=lambda other: other.cost, default=fit)
+            fit = least if least.cost < (1.0 - BETTER_ON_WHOLE) * fit.cost else fit
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
 
 
@@ -164,6 +176,15 @@ class _Trials:
         """Return the problem of a model on the whole records, with the delays that were shown."""
         shown = any(self.delayed) and not info.searched
         return (_with_delays(problem, self.delayed) if shown else problem).of_model(info)
+
+    def others(self, best: Tried) -> list[ModelInfo]:
+        """Return the models that are fitted to the whole records beside the best one."""
+        others = [
+            one
+            for one in sorted(self.found, key=lambda one: one.trial.rms)
+            if one is not best and one.start is not None and (best.ill or not one.ill)
+        ]
+        return [one.info for one in others if one.info.name != MANY_WEIGHTS][:OTHERS]
 
     def run(self, info: ModelInfo) -> bool:
         """Try a model; return whether it leaves nothing but noise."""

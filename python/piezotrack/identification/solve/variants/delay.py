@@ -22,7 +22,7 @@ __all__ = ["with_delay_tried"]
 GAIN = 0.05
 # A residual of so many times the noise has hardly anything but noise in it; up to so many times, a
 # delay changes its structure little.
-NOISY, NEAR = 1.05, 3.0
+NOISY, NEAR = 1.05, 1.5
 
 
 def with_delay_tried(
