@@ -107,7 +107,7 @@ TABLE = """
 --seed            N                                         Seed of the random numbers
 --seeds           N|A:B                                     Seeds of the random numbers
 --sensitivity     NUMBER                                    Largest sensitivity Ms
---sensor-delay    fit|TIME|LOW:HIGH                         Delay of the sensor
+--sensor-delay    none|fit|TIME|LOW:HIGH                    Delay of the sensor
 --skip            N                                         Lines above the titles
 --slew            SLEW                                      Largest rate of the drive
 --speed           NUMBER                                    relative to real time

@@ -52,6 +52,18 @@ def test_a_small_loop_within_a_dead_band_is_no_end() -> None:
     assert not pt.Dataset(u=u, y=y, dt=1e-3).at_end.any()
 
 
+@pytest.mark.parametrize("step", [0.0, 100e-9])
+@pytest.mark.parametrize("rate", [97.0, 431.0])
+def test_a_quick_drive_that_the_stage_does_not_follow_shows_no_end(
+    rate: float, step: float
+) -> None:
+    slow = 50.0 - 50.0 * np.cos(2.0 * np.pi * T)
+    y = STAGE.simulate(slow, 1.0 / RATE).x
+    y = step * np.round(y / step) if step else y
+    u = slow + 20.0 * np.sin(2.0 * np.pi * rate * T)
+    assert not pt.Dataset(u=u, y=y, dt=1.0 / RATE).at_end.any()
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("gain", [1.0, -1.0])
 @pytest.mark.parametrize("level", [0.7, 0.9, 0.97])

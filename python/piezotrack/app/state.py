@@ -112,10 +112,8 @@ class ModelState:
         Time of the second log from which it is the test [s].
     history : str or None
         As of `piezotrack.identify`; None for what the record shows.
-    delay : bool
-        Whether a delay is fitted.
-    drift : bool or None
-        Whether a drift is fitted; None for what the record shows.
+    delay, drift : bool or None
+        Whether a delay, a drift is fitted; None for what the record shows.
     seed : int
         Seed of the searches.
     """
@@ -125,7 +123,7 @@ class ModelState:
     chosen: str = ""
     test_from: float = 0.0
     history: Literal["virgin", "settled", "fit"] | None = None
-    delay: bool = False
+    delay: bool | None = None
     drift: bool | None = None
     seed: int = 0
 

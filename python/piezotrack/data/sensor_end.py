@@ -23,6 +23,9 @@ __all__ = ["SensorEnd", "end_mask", "end_note", "sensor_ends"]
 # the stroke and in standard deviations of the noise; and how far the drive goes further and back,
 # as a share of its range and in such distances.
 FEWEST, SHARE, NOISES, FURTHER, DISTANCES = 10, 1e-3, 8.0, 0.05, 3.0
+# How far its mean lies above that of as many samples before, and after, as a share of that: a
+# quick drive that the stage does not follow goes to and fro.
+RISEN = 0.3
 # Readings that are equal: how far the drive goes further, in its range and in steps of the sensor.
 FURTHER_EQUAL, STEPS = 0.01, 4.0
 # Readings that differ by noise, as a share of the stroke, are not equal by chance, whatever the
@@ -95,9 +98,9 @@ def sensor_ends(u: Array, y: Array) -> list[SensorEnd]:
         for distance, least in kinds:
             spans, furthest = [], 0.0
             for first, last in runs(np.abs(y - level) <= distance):
-                part = side * u[first:last]
-                further = float(part.max()) - float(max(part[0], part[-1]))
-                if last - first >= FEWEST and further > least:
+                further, risen = _motion(side * u, first, last)
+                goes_on = further > least and risen > RISEN * further
+                if last - first >= FEWEST and (goes_on or least < 0.0):
                     spans.append((first, last))
                     furthest = max(furthest, further)
             if spans:
@@ -105,6 +108,17 @@ def sensor_ends(u: Array, y: Array) -> list[SensorEnd]:
                 found.append(SensorEnd(level, furthest, mask, spans))
                 break
     return found
+
+
+def _motion(u: Array, first: int, last: int) -> tuple[float, float]:
+    """Return how far a drive goes beyond where it is at both ends of a run, and its mean there."""
+    part, length = u[first:last], last - first
+    further = float(part.max()) - float(max(part[0], part[-1]))
+    beside = [
+        one for one in (u[max(first - length, 0) : first], u[last : last + length]) if one.size
+    ]
+    level = max((float(one.mean()) for one in beside), default=-math.inf)
+    return further, float(part.mean()) - level
 
 
 def end_mask(ends: list[SensorEnd], count: int) -> Mask:

@@ -107,7 +107,9 @@ def test_the_tree_compiled_as_it_is_gives_the_same_bits(tmp_path: Path) -> None:
 @needs_library
 def test_a_table_is_played(tmp_path: Path) -> None:
     export = pt.control.export_controller
-    export(controller("plays"), tmp_path, to="library", name="axis", reference=SINE)
+    export(
+        controller("plays"), tmp_path, to="library", name="axis", reference=SINE, beyond_reach=True
+    )
     compiled(tmp_path, "check.c", "axis.c", flags=(*STRICT, *LINK), libraries=("-lpiezotrack",))
     code, figures = checked(tmp_path)
     assert (code, figures["largest"], figures["flags"]) == (0, 0.0, 0)

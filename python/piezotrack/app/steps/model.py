@@ -244,9 +244,8 @@ def model_options(desk: Desk, name: str) -> dict[str, Any]:
         options["test"] = state.test
         options["test_window"] = f"{plain(state.test_from)}:" if state.test_from else None
     options["history"] = state.history
-    options["delay"] = state.delay
-    if state.drift is not None:
-        options["drift" if state.drift else "no_drift"] = True
+    words = {True: "fit", False: "none", None: None}
+    options["sensor_delay"], options["drift"] = words[state.delay], words[state.drift]
     options["seed"] = state.seed or None
     options["out"] = "results"
     return options
@@ -255,7 +254,7 @@ def model_options(desk: Desk, name: str) -> dict[str, Any]:
 def _arguments(desk: Desk) -> dict[str, Any]:
     """Return the arguments of `identify` that were set."""
     state = desk.state.model
-    return {"history": state.history, "delay": state.delay or None, "drift": state.drift}
+    return {"history": state.history, "delay": state.delay, "drift": state.drift}
 
 
 def _split(desk: Desk) -> Part:
@@ -270,13 +269,13 @@ def _split(desk: Desk) -> Part:
         items.append(parts.number("test_from", "Test from", state.test_from, "s"))
     items.append(parts.file("test", "Second log as the test: drop or choose a file"))
     histories = [(None, "what the record shows"), ("virgin", "never moved"), ("settled", "settled")]
-    drifts = [(None, "where the record shows one"), (True, "fitted"), (False, "none")]
+    fitted = [(None, "where the record shows one"), (True, "fitted"), (False, "none")]
     items += [
         parts.select(
             "history", "Before the record", state.history, [*histories, ("fit", "fitted")]
         ),
-        parts.select("drift", "Drift of the sensor", state.drift, drifts),
-        parts.check("delay", "Fit a delay", state.delay),
+        parts.select("drift", "Drift of the sensor", state.drift, fitted),
+        parts.select("delay", "Delay of the sensor", state.delay, fitted),
         parts.number("seed", "Seed", state.seed, whole=True),
     ]
     return parts.controls("split", _split_words(desk), *items, step="model")

@@ -175,13 +175,12 @@ class MethodOptions:
     ] = None
     dynamics: Annotated[
         Literal["auto", "none", "lag", "mode"] | None,
-        Option("Its dynamics: none, first-order lag or resonance; default by the log"),
+        Option("Its dynamics: none, a lag or a mode; default auto"),
     ] = None
     method: Annotated[
         str | None,
         Option(
-            "Search: descents from random points, or a particle swarm with own or published "
-            "settings; default descents",
+            "Search: descents, or a particle swarm with own or published settings; default descents",
             Names(METHODS),
         ),
     ] = None
