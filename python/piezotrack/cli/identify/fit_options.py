@@ -180,7 +180,8 @@ class MethodOptions:
     method: Annotated[
         str | None,
         Option(
-            "Search: descents, or a particle swarm with own or published settings; default descents",
+            "Search: descents, or a particle swarm with own or published settings; default "
+            "descents",
             Names(METHODS),
         ),
     ] = None
