@@ -121,3 +121,24 @@ def test_a_record_that_neither_simple_history_explains_begins_with_a_fitted_one(
     small = record(40.0 + 6.0 * np.sin(2.0 * np.pi * t + 1.2), [75.0])
     assert fit.score(small, history="virgin").rms > 20.0 * fit.cost
     assert fit.score(small).rms < 3.0 * fit.cost
+
+
+def test_the_time_of_a_jump_within_the_first_interval_is_found() -> None:
+    # The drive jumps at once, a tenth of an interval before the first sample.
+    fine = 10
+    t = DT / fine * np.arange(fine * (T.size - 1) + 2)
+    u = 20.0 + 110.0 * np.abs((t - DT / fine + 0.5) % 1.0 - 0.5)
+    u[0] = 0.0
+    x = STAGE.simulate(u, DT / fine, initial=STAGE.equilibrium(0.0)).x[1::fine]
+    noise = NOISE * np.random.default_rng(0).normal(size=T.size)
+    log = pt.Dataset(u=u[1::fine], y=x + noise, dt=DT)
+    fit = pt.identify(log, "prandtl-ishlinskii", progress=False)
+    assert fit.start is not None
+    assert fit.start.history == "rest"
+    assert fit.cost < 1.5 * NOISE
+    assert fit.model.frequency == pytest.approx(120.0, rel=0.01)
+    # As a delay of nearly half of the interval over which the jump is simulated.
+    assert 0.3 * DT < fit.delay < 0.55 * DT
+    assert any("jump within the first sampling interval" in note for note in fit.notes)
+    late = pt.identify(log, "prandtl-ishlinskii", delay=False, progress=False)
+    assert late.cost > 3.0 * fit.cost

@@ -252,6 +252,13 @@ class Identification(IdentifiedModel):
                 data, run.x, record.cost_percent, self.model.info.hysteresis, held
             )
         notes += drift_notes(record.drift, record.stroke)
+        jumped = record.start is not None and record.start.history == "rest"
+        is_fitted = self.details.get("delay", {}).get("free", False)
+        if jumped and is_fitted and 0.0 < record.delay < data.measured_dt:
+            notes.append(
+                f"the delay of {1e3 * record.delay:.3g} ms may be that of the jump within the "
+                "first sampling interval, not of the sensor"
+            )
         notes += self.model._notes(lambda: run)
         lines = hum_lines(rest, measured.u, measured.y, measured.dt)
         notes += hum_notes(lines)
