@@ -54,6 +54,8 @@ def test_a_model_that_fits_the_whole_record_far_better_is_taken(
 ) -> None:
     # Of this record of ramps the first three fifths do not show what the rest does.
     monkeypatch.syspath_prepend(str(BENCH.parent))
+    for name in ("cases", "flaws", "records", "stages"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
     case = importlib.import_module("cases").make(1, 20)
     data = pt.Dataset(u=case.u, y=case.y, dt=case.dt)
     default = pt.identify(data)
