@@ -305,3 +305,12 @@ def test_every_chart_is_a_picture(window: Window, width: int, form: str) -> None
         assert content.startswith({"pdf": b"%PDF", "svg": b"<?xml", "png": b"\x89PNG"}[form])
     refused = window.do("picture", chart="nothing")[0]["error"]
     assert "one of drive, y, loop" in refused["text"]
+
+
+def test_the_line_of_a_search_does_not_run_back_to_the_next(window: Window) -> None:
+    window.do("log.example")
+    trial = model.trials_of(window.desk).rows["dahl"]
+    trial.course = [(35, 4e-6), (900, 1e-6), (35, 5e-6), (400, 2e-6)]
+    count, error = model._columns(trial, 1e6)
+    assert not (np.diff(count) < 0).any()
+    np.testing.assert_allclose(error, [4.0, 1.0, np.nan, 5.0, 2.0])

@@ -362,7 +362,10 @@ def _convergence(desk: Desk, trials: Trials) -> Part | None:
 
 
 def _columns(trial: Trial, scale: float) -> tuple[Any, Any]:
+    """Return simulations and errors; the line is broken where the next search counts from 1."""
     course = np.array(trial.course)
+    begun = np.flatnonzero(np.diff(course[:, 0]) < 0) + 1
+    course = np.insert(course, begun, np.nan, axis=0)
     return np.maximum(course[:, 0], 1.0), scale * course[:, 1]
 
 
