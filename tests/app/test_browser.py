@@ -146,6 +146,21 @@ def test_a_comma_is_a_decimal_point_and_words_are_no_number(
     assert faults == []
 
 
+def test_an_emptied_field_beside_a_slider_is_said(
+    browser: Any, address: tuple[str, Any], tmp_path: Path
+) -> None:
+    page, faults = opened(browser, address[0])
+    log = pt.datasets.dbo_training()[3.0:13.0].save(tmp_path / "stage.csv")
+    page.set_input_files("input[type=file]", log)
+    page.get_by_role("button", name="Next: Model").click()
+    share = page.get_by_label("Fitted share of the window as a number")
+    for words, sentence in (("", "expected a number"), ("60", "expected 0.2 to 0.9")):
+        share.fill(words)
+        share.press("Enter")
+        page.wait_for_selector(f"text={sentence}; the value before is used")
+    assert faults == []
+
+
 def test_two_windows_do_not_share_and_a_killed_server_is_said(
     browser: Any, address: tuple[str, Any], tmp_path: Path
 ) -> None:
