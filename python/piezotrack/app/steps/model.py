@@ -91,7 +91,8 @@ def _until(window: Dataset, share: float) -> float:
 
 
 def _end(window: Dataset) -> float:
-    return float(window.t[-1]) + window.dt
+    """Return the time after which a window has no sample, without the last bits of a sum [s]."""
+    return float(f"{window.t[-1] + window.dt:.12g}")
 
 
 def test_of(desk: Desk) -> Dataset:
