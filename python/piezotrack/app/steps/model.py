@@ -262,9 +262,7 @@ def _split(desk: Desk) -> Part:
     state = desk.state.model
     items = []
     if not state.test:
-        items.append(
-            parts.slider("share", "Fitted share of the window", state.share, SHARES)
-        )
+        items.append(parts.slider("share", "Fitted share of the window", state.share, SHARES))
     else:
         items.append(parts.number("test_from", "Test from", state.test_from, "s"))
     items.append(parts.file("test", "Second log as the test: drop or choose a file"))
