@@ -161,6 +161,20 @@ def test_an_emptied_field_beside_a_slider_is_said(
     assert faults == []
 
 
+def test_the_step_that_is_shown_is_in_the_rail_of_a_phone(
+    browser: Any, address: tuple[str, Any]
+) -> None:
+    page, faults = opened(browser, address[0])
+    page.set_viewport_size({"width": 390, "height": 844})
+    for step in "51":
+        page.keyboard.press(step)
+        page.wait_for_selector(f"[aria-current=step] >> text={step} ")
+        box = page.locator("[aria-current=step]").bounding_box()
+        assert box["x"] > -1.0
+        assert box["x"] + box["width"] < 391.0
+    assert faults == []
+
+
 def test_two_windows_do_not_share_and_a_killed_server_is_said(
     browser: Any, address: tuple[str, Any], tmp_path: Path
 ) -> None:
