@@ -146,6 +146,35 @@ def test_a_comma_is_a_decimal_point_and_words_are_no_number(
     assert faults == []
 
 
+def test_an_emptied_field_beside_a_slider_is_said(
+    browser: Any, address: tuple[str, Any], tmp_path: Path
+) -> None:
+    page, faults = opened(browser, address[0])
+    log = pt.datasets.dbo_training()[3.0:13.0].save(tmp_path / "stage.csv")
+    page.set_input_files("input[type=file]", log)
+    page.get_by_role("button", name="Next: Model").click()
+    share = page.get_by_label("Fitted share of the window as a number")
+    for words, sentence in (("", "expected a number"), ("60", "expected 0.2 to 0.9")):
+        share.fill(words)
+        share.press("Enter")
+        page.wait_for_selector(f"text={sentence}; the value before is used")
+    assert faults == []
+
+
+def test_the_step_that_is_shown_is_in_the_rail_of_a_phone(
+    browser: Any, address: tuple[str, Any]
+) -> None:
+    page, faults = opened(browser, address[0])
+    page.set_viewport_size({"width": 390, "height": 844})
+    for step in "51":
+        page.keyboard.press(step)
+        page.wait_for_selector(f"[aria-current=step] >> text={step} ")
+        box = page.locator("[aria-current=step]").bounding_box()
+        assert box["x"] > -1.0
+        assert box["x"] + box["width"] < 391.0
+    assert faults == []
+
+
 def test_two_windows_do_not_share_and_a_killed_server_is_said(
     browser: Any, address: tuple[str, Any], tmp_path: Path
 ) -> None:

@@ -244,6 +244,37 @@ def test_a_motion_beyond_the_reach_is_said_beside_its_files(window: Window) -> N
     assert "use.warnings" not in window.do("whole")[0]["order"]
 
 
+def test_the_reach_is_waived_where_the_motion_is_beyond_it_alone(
+    window: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    window.do("log.example")
+    window.do("go", to="model")
+    window.finish()
+    window.set("loop", kp=1e4)
+    name, content = window.take("use.model")
+    Path("results").mkdir()
+    Path("results", name).write_bytes(content)
+    commands = {"motion": "feedforward", "loop": "track", "use": "export"}
+    for high, beyond in ((None, False), (100e-6, True)):
+        window.set("motion", high=high)
+        for step, name in commands.items():
+            lines = PAGES[step].commands(window.desk)
+            (line,) = (one for one in lines if one.split()[1] == name)
+            assert ("--beyond-reach" in line) is beyond
+            if step != "use":
+                ran(*shlex.split(line)[1:], "--overwrite")
+        assert ("beyond_reach=True" in "\n".join(PAGES["use"].python(window.desk))) is beyond
+
+
+def test_the_window_of_the_test_ends_without_the_last_bits_of_a_sum(
+    window: Window, tmp_path: Path
+) -> None:
+    opened(window, pt.datasets.dbo_training(), tmp_path)
+    end = model.model_options(window.desk, "duhem")["test_window"].partition(":")[2]
+    assert end == "40.135"
+
+
 def test_what_is_unusual_has_a_place_and_a_button(window: Window, tmp_path: Path) -> None:
     t = np.arange(4000) / 200.0
     u = 30.0 - 30.0 * np.cos(2.0 * np.pi * t / 2.0)
@@ -305,3 +336,12 @@ def test_every_chart_is_a_picture(window: Window, width: int, form: str) -> None
         assert content.startswith({"pdf": b"%PDF", "svg": b"<?xml", "png": b"\x89PNG"}[form])
     refused = window.do("picture", chart="nothing")[0]["error"]
     assert "one of drive, y, loop" in refused["text"]
+
+
+def test_the_line_of_a_search_does_not_run_back_to_the_next(window: Window) -> None:
+    window.do("log.example")
+    trial = model.trials_of(window.desk).rows["dahl"]
+    trial.course = [(35, 4e-6), (900, 1e-6), (35, 5e-6), (400, 2e-6)]
+    count, error = model._columns(trial, 1e6)
+    assert not (np.diff(count) < 0).any()
+    np.testing.assert_allclose(error, [4.0, 1.0, np.nan, 5.0, 2.0])

@@ -37,6 +37,8 @@ AT_ONCE: list[tuple[str, str, float | str]] = [
     ("log", "resample", -1.0),
     ("log", "decimate", 0),
     ("model", "seed", -1),
+    ("model", "share", 0.0),
+    ("model", "share", 60.0),
     ("motion", "frequency", 0.0),
     ("motion", "frequency", -1.0),
     ("motion", "steps", 0),

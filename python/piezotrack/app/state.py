@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 __all__ = [
+    "SHARES",
     "STEPS",
     "DeviceState",
     "LogState",
@@ -50,6 +51,8 @@ ABOVE = {
     "cutoff",
 }
 NOT_BELOW = {"seed", "ki", "kd", "low_pass", "notch", "delay", "noise", "spread"}
+# Shares of the window that are fitted, at least and at most.
+SHARES = (0.2, 0.9)
 
 Span = tuple[float, float]
 
@@ -396,11 +399,13 @@ def checked(kind: type[Any], values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _in_range(name: str, value: Any) -> Any:
-    """Return a setting that has to be above 0, not below it, or a name in C."""
+    """Return a setting that has to be above 0, not below it, between two, or a name in C."""
     if value is not None and name in ABOVE and value <= 0:
         raise ParameterError(name, f"{value:g}", "a number above 0")
     if value is not None and name in NOT_BELOW and value < 0:
         raise ParameterError(name, f"{value:g}", "0 or a number above it")
+    if name == "share" and not SHARES[0] <= value <= SHARES[1]:
+        raise ParameterError(name, f"{value:g}", f"{SHARES[0]} to {SHARES[1]}")
     return checked_name(value) if name == "name" else value
 
 

@@ -49,6 +49,12 @@ REMEDIES = [
     (r"pt\.\w+\.from_um\(k[pq]=.*\)", "a value in V/um", "--kp"),
     (r"\bmissing='(drop|fill)'", r"--missing \1", "--missing"),
     (r"\bcreep=False", "--creep none", "--creep"),
+    # Ingredients of a fit that its residual asks for: these options take a value.
+    (r"\btry (?:LeastSquares\(creep=True\)|creep=True)", "try --creep fit", "--creep"),
+    (r"\btry LeastSquares\(dynamics=\"second\"\)", "try --dynamics mode", "--dynamics"),
+    (r"\btry delay=True", "try --sensor-delay fit", "--sensor-delay"),
+    (r"\btry drift=True", "try --drift fit", "--drift"),
+    (r"\btry '([a-z-]+)'", r"try --model \1", "--model"),
     (r"\blog\[([^\]]*)\]", r"--window \1", "--window"),
     (r"\bmethod='lifted'", "--from-rest", "--from-rest"),
     (r"\bseeds(?= is\b)", "--draws", "--draws"),

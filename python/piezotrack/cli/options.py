@@ -86,7 +86,7 @@ TestWindow = Annotated[
 Zero = Annotated[
     bool,
     Option(
-        "Count displacements from the initial sensor reading, before the drive moves; of a device "
+        "Count displacements from the first reading of the record that was identified; of a device "
         "or another stage, from its rest"
     ),
 ]

@@ -167,7 +167,7 @@ def test_feedback_and_the_lifted_method() -> None:
         ("--seed 2", "--seed has no effect without --noise"),
         ("--td 0.1", "--td has no effect without --kp"),
         ("--kp 0.1", "--ti is missing"),
-        ("--stage gone.json", "gone.json: no such file"),
+        ("--stage gone.json", "gone.json: there is no such file"),
         ("--stage xu-li-2010 --noise 5nm", "--noise has no effect with --stage xu-li-2010"),
         ("--stage metres.json", "--stage is metres.json, whose drive is in um: expected one in V"),
         ("--json --quiet", "--json and --quiet"),

@@ -363,7 +363,7 @@ REFUSED: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("--repetitive", "does not repeat"),
     ),
     "a period twice": ((*TRACK, "--period", "2"), ("--period", "from a file")),
-    "stage": ((*OWN, "--stage", "real"), ("real: no such file",)),
+    "stage": ((*OWN, "--stage", "real"), ("real: there is no such file",)),
     "gains without feedback": (
         (*OWN, "--ti", "0.01"),
         ("--ti has no effect without --kp: expected it left out",),

@@ -261,7 +261,7 @@ def test_before_the_first_trial_is_there_nothing_is_written(
         ("--feedback", "--feedback has no effect with --device"),
         ("--rest -1", "rest is -1 V at sample 0: expected 0 to 75 V"),
         ("--device usb:1", "device is 'usb:1': expected an address"),
-        ("--device virtual:gone.json", "gone.json: no such file"),
+        ("--device virtual:gone.json", "gone.json: there is no such file"),
         ("--device scpi://localhost:1?unit=um&limits=0..75V", "localhost:1 does not answer"),
         ("--limits 0:90", "limits of the controller are 0 to 90 V: expected a range within 0 to"),
         ("--dt 1e-6", "rate is 1e+06 Hz: expected 0.1 to 100000 Hz, the rates of the device"),

@@ -71,7 +71,7 @@ def test_it_serves_scpi_at_an_address_that_connects() -> None:
 
 def test_what_cannot_be_served_is_refused() -> None:
     write_model()
-    assert refusal("serve", "gcs", "none.json").startswith("none.json: no such file")
+    assert refusal("serve", "gcs", "none.json").startswith("none.json: there is no such file")
     # It was never identified from a record.
     message = refusal("serve", "gcs", "dahl.json")
     assert message.startswith("--limits is not given, and dahl.json does not say")

@@ -35,6 +35,7 @@ from commands import (
     write_model,
 )
 from piezotrack.cli.commands import app
+from piezotrack.cli.identify.identify import identify_command
 from piezotrack.data.log_file import write_log
 from piezotrack.identification.views import plot as views
 from records import BOX, HELD, quick
@@ -47,6 +48,24 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 # What it does.
+
+
+@pytest.mark.parametrize(
+    "remedy",
+    [
+        "creep=True",
+        "LeastSquares(creep=True)",
+        'LeastSquares(dynamics="second")',
+        "delay=True",
+        "drift=True",
+        "'rate-dependent-prandtl-ishlinskii'",
+    ],
+)
+def test_what_a_residual_asks_for_is_an_option_with_its_value(remedy: str) -> None:
+    printed = as_printed(f"a resonance explains 30 % of the squared residual: try {remedy}")
+    options = printed.partition(": try ")[2].split()
+    assert len(options) == 2
+    assert identify_command.make_context("identify", ["log.csv", *options]).params
 
 
 def test_identify_writes_what_python_finds() -> None:

@@ -265,5 +265,5 @@ def test_other_files_are_refused() -> None:
         Path("loop.json").write_text(content, encoding="utf-8")
         with pytest.raises(DataError, match=words):
             pt.load_controller("loop.json")
-    with pytest.raises(DataError, match=r"gone\.json: no such file"):
+    with pytest.raises(DataError, match=r"gone\.json: there is no such file in"):
         pt.load_controller("gone.json")

@@ -108,6 +108,14 @@ def test_the_core_takes_a_law_by_its_name_and_numbers(name: str) -> None:
     assert len(above) <= len(below)
 
 
+@pytest.mark.parametrize(
+    ("count", "words"), [(0, "75 V)"), (1, ", 1 filter)"), (2, ", 2 filters)")]
+)
+def test_a_controller_counts_its_filters(count: int, words: str) -> None:
+    filters = [pt.Notch(100.0 + k) for k in range(count)]
+    assert repr(pt.Controller(dt=1e-3, limits=(0.0, 75.0), filters=filters)).endswith(words)
+
+
 @pytest.mark.parametrize("name", LAWS)
 def test_the_core_refuses_a_number_too_many(name: str) -> None:
     _, numbers = made(name)._settings

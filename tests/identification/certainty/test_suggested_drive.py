@@ -195,6 +195,19 @@ def test_a_fit_is_compared_with_its_record_whose_slow_sine_shows_no_lag() -> Non
     assert "record fitted" in drive.summary()
 
 
+def test_more_than_a_hundred_per_cent_is_no_power_of_ten() -> None:
+    drive = suggested(PLAYS, noise=5e-6)
+    shares = [
+        100.0 * each / abs(one.value)
+        for one in drive.parameters.values()
+        for each in (one.deviation, one.of_sine)
+        if np.isfinite(each)
+    ]
+    assert max(shares) > 100.0
+    table = drive.summary().partition("standard deviations")[2].splitlines()[2:]
+    assert not any("e+" in cell for line in table for cell in line.split()[-2:])
+
+
 def test_the_table_is_played_by_a_device(tmp_path: Path) -> None:
     drive = suggested(PLAYS, seconds=1.0)
     path = drive.save(tmp_path / "next.csv")

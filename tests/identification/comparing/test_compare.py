@@ -435,7 +435,7 @@ def test_ctrl_c_in_the_first_model_leaves_nothing(monkeypatch: pytest.MonkeyPatc
 REFUSED_COMMANDS: dict[str, tuple[str, ...]] = {
     "compare gone.csv": ("gone.csv: there is no such file",),
     "compare log.csv --model jiles-atherton": ("log.csv: --model has 'jiles-atherton'", "'dahl'"),
-    "compare log.csv --model gone.json": ("gone.json: no such file",),
+    "compare log.csv --model gone.json": ("gone.json: there is no such file in '.'",),
     "compare log.csv --model log.json": ("log.json",),
     "compare log.csv --window 5": ("--window is '5'", "expected A:B"),
     "compare log.csv --window a:b": ("--window has 'b'", "number"),

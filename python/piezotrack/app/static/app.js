@@ -151,8 +151,12 @@ function rail(steps) {
     lamp.setAttribute("aria-label", one.light);
     name.textContent = `${i + 1} ${one.title}`;
     words.textContent = one.text;
-    if (one.step === step) button.setAttribute("aria-current", "step");
-    else button.removeAttribute("aria-current");
+    if (one.step !== step) button.removeAttribute("aria-current");
+    else if (!button.hasAttribute("aria-current")) {
+      button.setAttribute("aria-current", "step");
+      // On a phone the rail is a row that is wider than the screen.
+      button.scrollIntoView({ block: "nearest", inline: "nearest" });
+    }
   });
 }
 

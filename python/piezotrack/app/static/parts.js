@@ -53,7 +53,10 @@ function slider(item, change) {
     return Number((log ? Math.exp(v) : v).toPrecision(digits));
   };
   const input = element("input", { type: "range", min: 0, max: STEPS, step: 1, value: place(item.value) });
-  const field = numeral((value) => value !== null && change(inside(item, value), false));
+  const field = numeral((value) => {
+    if (value !== null) change(inside(item, value), false);
+    else faultIn(field.closest(".control"), "expected a number; the value before is used");
+  });
   field.value = shown(item, item.value);
   const unit = item.unit ?? "";
   const say = (v) => input.setAttribute("aria-valuetext", item.words?.[0] ? `${v}, from ${item.words[0]} to ${item.words[1]}` : `${shown(item, v)} ${unit}`);

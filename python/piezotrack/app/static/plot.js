@@ -468,6 +468,7 @@ export class Chart {
     for (const line of this.lines) {
       const every = Math.max(1, Math.ceil(line.x.length / 100));
       for (let i = 0; i < line.x.length; i += every) {
+        if (Number.isNaN(line.x[i])) continue;
         const row = body.insertRow();
         for (const text of [line.name, show(line.x[i], "x"), show(line.y[i], "y")]) row.insertCell().textContent = text;
       }

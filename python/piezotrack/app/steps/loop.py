@@ -27,7 +27,7 @@ from .closed_loop import (
     tuning_parts,
 )
 from .model import chosen_trial
-from .motion import motion_line, motion_word
+from .motion import is_beyond, motion_line, motion_word
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -127,6 +127,7 @@ class LoopStep:
                     ti=f"{1e3 * gains.kp / gains.ki:.9g}ms" if gains.ki > 0.0 else "inf",
                     td=f"{1e3 * gains.kd / gains.kp:.9g}ms" if gains.kp > 0.0 else None,
                     noise=f"{1e9 * noise_of(desk):.3g}nm",
+                    beyond_reach=is_beyond(desk),
                 )
             ]
         return lines

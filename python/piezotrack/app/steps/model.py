@@ -20,6 +20,7 @@ from ...stages.registry import MODELS
 from .. import parts
 from ..code import Code, call, command, given, plain
 from ..desk import Same
+from ..state import SHARES
 from .log import log_options, record_of, stamp, window_of
 
 if TYPE_CHECKING:
@@ -37,8 +38,6 @@ __all__ = ["ModelStep", "chosen_trial", "fit_of", "model_options", "test_of"]
 
 # Those that take the least time, first; then all others.
 FIRST = ("duhem", "dahl", "prandtl-ishlinskii", "lugre", "bouc-wen")
-# Shares of a window that may be fitted.
-LEAST, MOST = 0.2, 0.9
 # Rms error in shares of the stroke below which a model is good, and above which it is not.
 GOOD, POOR = 0.005, 0.03
 
@@ -87,13 +86,13 @@ def parts_of(desk: Desk) -> tuple[Dataset, Dataset, bool]:
 
 def _until(window: Dataset, share: float) -> float:
     """Return the time until which a window is fitted, on a round number [s]."""
-    share = min(max(share, LEAST), MOST)
     digits = max(0, 3 - int(np.floor(np.log10(window.duration))))
     return round(float(window.t[0]) + share * window.duration, digits)
 
 
 def _end(window: Dataset) -> float:
-    return float(window.t[-1]) + window.dt
+    """Return the time after which a window has no sample, without the last bits of a sum [s]."""
+    return float(f"{window.t[-1] + window.dt:.12g}")
 
 
 def test_of(desk: Desk) -> Dataset:
@@ -262,9 +261,7 @@ def _split(desk: Desk) -> Part:
     state = desk.state.model
     items = []
     if not state.test:
-        items.append(
-            parts.slider("share", "Fitted share of the window", state.share, (LEAST, MOST))
-        )
+        items.append(parts.slider("share", "Fitted share of the window", state.share, SHARES))
     else:
         items.append(parts.number("test_from", "Test from", state.test_from, "s"))
     items.append(parts.file("test", "Second log as the test: drop or choose a file"))
@@ -361,7 +358,10 @@ def _convergence(desk: Desk, trials: Trials) -> Part | None:
 
 
 def _columns(trial: Trial, scale: float) -> tuple[Any, Any]:
+    """Return simulations and errors; the line is broken where the next search counts from 1."""
     course = np.array(trial.course)
+    begun = np.flatnonzero(np.diff(course[:, 0]) < 0) + 1
+    course = np.insert(course, begun, np.nan, axis=0)
     return np.maximum(course[:, 0], 1.0), scale * course[:, 1]
 
 

@@ -36,7 +36,14 @@ if TYPE_CHECKING:
     from ..desk import Desk
     from ..parts import Light, Part
 
-__all__ = ["MotionStep", "beyond_reach", "motion_file", "motion_line", "motion_word"]
+__all__ = [
+    "MotionStep",
+    "beyond_reach",
+    "is_beyond",
+    "motion_file",
+    "motion_line",
+    "motion_word",
+]
 
 KINDS = {
     "triangle": "triangle",
@@ -64,7 +71,7 @@ class MotionStep:
         if not desk.state.log.source or chosen_trial(desk) is None:
             return "grey", "needs a model"
         motion = reference_of(desk)
-        beyond = _beyond(desk)
+        beyond = is_beyond(desk)
         words = f"{motion.name}, {length_text(motion.high - motion.low, 3)}"
         return ("amber" if beyond else "green"), words
 
@@ -88,10 +95,17 @@ class MotionStep:
         if not desk.state.log.source or chosen_trial(desk) is None:
             return []
         noise = call("stage = pt.VirtualStage.of", "fit", noise=noise_of(desk), seed=1)
+        run = call(
+            "run = pt.track",
+            "stage",
+            "pt.Controller.of(fit)",
+            "reference",
+            beyond_reach=is_beyond(desk) or None,
+        )
         return [
             motion_line(desk),
             noise,
-            "run = pt.track(stage, pt.Controller.of(fit), reference, beyond_reach=True)",
+            run,
             "print(run.metrics)",
         ]
 
@@ -100,7 +114,8 @@ class MotionStep:
         if not desk.state.log.source or chosen_trial(desk) is None:
             return []
         name = model_of(desk).model.info.name
-        return [command("feedforward", f"results/{name}.json", motion_word(desk), out="voltage")]
+        options = {"out": "voltage", "beyond_reach": is_beyond(desk)}
+        return [command("feedforward", f"results/{name}.json", motion_word(desk), **options)]
 
     @property
     def actions(self) -> Mapping[str, Callable[[Desk, Mapping[str, Any]], Download | None]]:
@@ -149,7 +164,8 @@ def motion_file(desk: Desk) -> str:
     return {"file": state.file, "raster": "motion.csv", "spiral": "motion.csv"}.get(state.kind, "")
 
 
-def _beyond(desk: Desk) -> bool:
+def is_beyond(desk: Desk) -> bool:
+    """Whether commands and functions have to be told that the motion may be beyond the reach."""
     motion, reach = reference_of(desk), reach_of(desk)
     slack = 0.01 * (reach.high - reach.low)
     return motion.low < reach.low - slack or motion.high > reach.high + slack
@@ -190,7 +206,7 @@ def _controls(desk: Desk) -> Part:
 
 def beyond_reach(desk: Desk) -> list[Part]:
     """Say that the motion is beyond the reach, with what mends it; nothing where it is not."""
-    if not _beyond(desk):
+    if not is_beyond(desk):
         return []
     motion = reference_of(desk)
     words = (

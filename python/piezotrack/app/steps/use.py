@@ -28,7 +28,7 @@ from .closed_loop import (
 from .log import LogStep
 from .loop import LoopStep, stable
 from .model import ModelStep, chosen_trial, fit_of
-from .motion import beyond_reach, motion_word
+from .motion import beyond_reach, is_beyond, motion_word
 from .on_device import RUNNING, running
 
 if TYPE_CHECKING:
@@ -124,7 +124,8 @@ class UseStep:
             to=use.to,
             name=use.name,
             single=use.single or None,
-            **({"reference": REFERENCE, "beyond_reach": True} if periodic else {}),
+            reference=REFERENCE if periodic else None,
+            beyond_reach=(periodic and is_beyond(desk)) or None,
         )
         return [
             *LogStep().python(desk),
@@ -143,7 +144,7 @@ class UseStep:
         motion = [motion_word(desk)] if reference_of(desk).period is not None else []
         where = "controller.json" if by_hand(desk) else "tuned/controller.json"
         options = {"to": use.to, "name": use.name, "float": use.single, "out": "firmware"}
-        free = bool(motion)
+        free = bool(motion) and is_beyond(desk)
         exported = command("export", where, *motion, **options, beyond_reach=free)
         note = ["# controller.json: by the script, as its gains were set by hand"]
         return [

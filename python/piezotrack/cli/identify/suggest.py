@@ -38,7 +38,7 @@ def suggest_command(
     """Suggest the drive that would determine a model best.
 
     Written as a table that `piezotrack measure` plays, with the standard deviations of the
-    parameters to expect.
+    parameters to expect. One of --dt and --rate is required.
     """
     from ..._support.files.writing import (
         picture_files,

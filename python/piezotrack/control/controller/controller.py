@@ -214,7 +214,8 @@ class Controller:
 
     def __repr__(self) -> str:
         low, high = self.limits
-        filters = f", {len(self.filters)} filters" if self.filters else ""
+        count = len(self.filters)
+        filters = f", {count} filter{'s' if count > 1 else ''}" if count else ""
         unit, scale = shown_unit(self.drive_unit)
         return (
             f"Controller({self.title}, {1.0 / self.dt:.6g} Hz, "

@@ -286,6 +286,10 @@ def read_content(path: str | os.PathLike[str]) -> tuple[str, Any]:
         raise DataError(
             f"{file.name}: is a directory: expected a file that piezotrack saved"
         ) from None
+    except FileNotFoundError:
+        raise DataError(
+            f"{file.name}: there is no such file in {quoted(str(file.parent))}"
+        ) from None
     except OSError as error:
         raise DataError(f"{file.name}: {(error.strerror or str(error)).lower()}") from None
     except ValueError as error:

@@ -71,4 +71,6 @@ def _percents(one: ExpectedDeviation, *, known: bool) -> list[str]:
 
 def _percent(deviation: float, value: float) -> str:
     """Write a deviation in per cent of a value."""
-    return f"{100.0 * deviation / abs(value):.2g}" if math.isfinite(deviation) else "> 500"
+    if not math.isfinite(deviation):
+        return "> 500"
+    return plain(float(f"{100.0 * deviation / abs(value):.2g}"))
