@@ -84,7 +84,8 @@ def searches_text(tuned: Tuned) -> str:
     half = sorted(tuned.spread)[(len(tuned.spread) - 1) // 2]
     if not math.isfinite(half):
         return f"fewer than half of {tuned.searches} searches keep what is required"
-    return f"half of {tuned.searches} searches end within {100.0 * half:.1f} % of the best"
+    nearer = max(100.0 * half, 0.1)
+    return f"half of {tuned.searches} searches end within {nearer:.1f} % of the best"
 
 
 @drawing
