@@ -66,19 +66,19 @@ def errors_of(lines: list[str]) -> list[float]:
 def test_a_loop_that_fails_says_where_its_beginning_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """In the first period of the reference, of which nothing would count in a whole run."""
     # An interval that a busy computer keeps too.
-    loop = pt.Controller(dt=0.1, limits=(0.0, 75.0), feedback=pt.Pid.from_um(kp=0.02, ti=0.3))
+    loop = pt.Controller(dt=0.25, limits=(0.0, 75.0), feedback=pt.Pid.from_um(kp=0.02, ti=0.75))
     loop.save("loop.json")
     readings = [0]
 
     class Lost(VirtualDevice):
         def exchange(self, volts: float) -> float:
             readings[0] += 1
-            if readings[0] == 600:
+            if readings[0] == 340:
                 raise pt.DeviceError("the connection was lost")
             return super().exchange(volts)
 
     use(monkeypatch, Lost(pt.VirtualStage.of(PLAYS, limits=(0.0, 75.0))))
-    motion = "sine:0.04Hz,20..60um,100s"
+    motion = "sine:0.016Hz,20..60um,250s"
     said = refusal("track", "loop.json", "--device", "virtual:", motion, "--out", "tk")
     assert "the connection was lost; the run up to then is in tk" in said
     assert names("tk") == ["tracking.csv", "tracking.json", "tracking.png", "tracking.svg"]
