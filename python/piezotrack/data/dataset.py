@@ -380,7 +380,7 @@ class Dataset(Viewed):
     def at_end(self) -> Mask:
         """Readings in the window where the sensor or the stage is at its end, shape (n,).
 
-        None where they would be more than half of the record.
+        No reading where these would be more than half of the record.
         """
         return self._at_end_of_all[self._start :]
 
@@ -450,13 +450,14 @@ class Dataset(Viewed):
         >>> f"{log.stroke * 1e6:.0f} um, {log.without_faulty_readings().stroke * 1e6:.0f} um"
         '70 um, 40 um'
         """
-        faulty = self.at_end | self.far if are_few(self.far) else self.at_end
-        left_out = self.left_out
+        # Those of the warm-up, which does not count, have no effect.
+        mask = self._at_end_of_all
+        if are_few(self.far):
+            mask = mask | self._far_of_all
+        faulty, left_out = mask[self._start :], self.left_out
         if not faulty.any() or (left_out is not None and left_out[faulty].all()):
             return self
         part = self._part(0, self._u.size, start=self._start)
-        # Those of the warm-up, which does not count, have no effect.
-        mask = self._at_end_of_all | self._far_of_all if are_few(self.far) else self._at_end_of_all
         mask = mask if self._left_out is None else self._left_out | mask
         part._recorded = self._y if self._recorded is None else self._recorded
         part._y, part._left_out = signal_of("y", bridged(self._y, mask)), mask

@@ -12,6 +12,7 @@ import pytest
 
 import piezotrack as pt
 from folders import ROOT
+from piezotrack.identification.solve import selection
 
 BENCH = ROOT / "benches" / "records" / "choices.py"
 
@@ -62,3 +63,12 @@ def test_a_model_that_fits_the_whole_record_far_better_is_taken(
     assert default.selection is not None
     named = pt.identify(data, "prandtl-ishlinskii")
     assert default.cost < named.cost / 0.75
+
+    # One that cannot be fitted to the whole record is left aside.
+    def refused(problem: Any, *arguments: Any) -> Any:
+        if len(problem.records[0].data) == len(data) and problem.model != "bouc-wen":
+            raise pt.NumericalError("no candidate could be simulated")
+        return identify_model(problem, *arguments)
+
+    monkeypatch.setattr(selection, "identify_model", refused)
+    assert pt.identify(data).model.info.name == "bouc-wen"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -133,9 +134,12 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
         fit = whole(best.info)
         if fit.cost > NEAR_NOISE * max(noise_of(record.data) for record in problem.records):
             # The first part does not show all that the whole record does.
-            others = [whole(info) for info in trials.others(best)]
-            least = min(others, key=lambda other: other.cost, default=fit)
-            fit = least if least.cost < (1.0 - BETTER_ON_WHOLE) * fit.cost else fit
+            least = (1.0 - BETTER_ON_WHOLE) * fit.cost
+            for info in trials.others(best):
+                with suppress(DataError, NumericalError):
+                    other = whole(info)
+                    if other.cost < least:
+                        fit, least = other, other.cost
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
 
 
