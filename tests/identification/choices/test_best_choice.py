@@ -13,6 +13,7 @@ import pytest
 import piezotrack as pt
 from folders import ROOT
 from piezotrack.identification.solve import selection
+from piezotrack.identification.solve.one_model import identify_model
 
 BENCH = ROOT / "benches" / "records" / "choices.py"
 
