@@ -318,7 +318,7 @@ def test_a_device_is_published_in_the_place_of_the_virtual_stage() -> None:
         ("epics --prefix A --device virtual: --limits 0:9", "--limits has no effect with --dev"),
         ("epics --prefix A --device virtual: m.json", "MODEL has no effect with --device"),
         ("epics --prefix A --device usb:1", "--device is 'usb:1': expected an address"),
-        ("epics gone.json --prefix A", "gone.json: no such file"),
+        ("epics gone.json --prefix A", "gone.json: there is no such file"),
         ("epics --prefix A --limits 75:0", "--limits is 75 to 0 V: expected the lower one first"),
         ("epics --prefix A --speed 0", "--speed is 0: expected"),
         ("gcs --prefix A", "--prefix has no effect with gcs: expected it left out"),
