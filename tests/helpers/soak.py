@@ -31,8 +31,11 @@ if TYPE_CHECKING:
 # The folders above it may have its name too, as a checkout often has.
 PACKAGE = Path(pt.__file__).parent
 LONGEST_MESSAGE = 500
-# Of one call [s]: it is asked to stop, has to have done so, and ends the process with a traceback.
-LONG, SLOW, HANG = 2.0, 12.0, 120.0
+# Of one call: CPU time [s] after which it is asked to stop, and by which it has to have done so,
+# which other work on the machine does not change; time by the clock [s] after which it is asked as
+# well, as one that waits takes no CPU, and after which the process ends with a traceback.
+LONG, SLOW = 2.0, 12.0
+WAITING, HANG = 10.0, 240.0
 # Every so many successful calls are made twice.
 REPEAT_EVERY = 8
 KEPT = 3
@@ -159,7 +162,15 @@ class Script:
 
 
 REFUSED, STOPPED = object(), object()
-ALARM = getattr(signal, "SIGALRM", None)
+# Signals and timers of CPU time and of the clock; none on Windows.
+ALARMS = (
+    [
+        (signal.SIGPROF, signal.ITIMER_PROF, 1.0),
+        (signal.SIGALRM, signal.ITIMER_REAL, WAITING / LONG),
+    ]
+    if hasattr(signal, "setitimer")
+    else []
+)
 
 
 class TimeUpError(KeyboardInterrupt):
@@ -180,14 +191,14 @@ class Alarm:
     def set(cls, after: float) -> None:
         cls.rung = False
         faulthandler.dump_traceback_later(HANG, exit=True)
-        if ALARM is not None:
-            signal.signal(ALARM, cls.ring)
-            signal.setitimer(signal.ITIMER_REAL, after)
+        for number, timer, ratio in ALARMS:
+            signal.signal(number, cls.ring)
+            signal.setitimer(timer, ratio * after)
 
     @staticmethod
     def off() -> None:
-        if ALARM is not None:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
+        for _, timer, _ in ALARMS:
+            signal.setitimer(timer, 0.0)
         faulthandler.cancel_dump_traceback_later()
 
 
@@ -206,7 +217,7 @@ def verdict_of(call: Callable[[], Any], *, after: float = LONG) -> tuple[list[st
 def _verdict_of(call: Callable[[], Any]) -> tuple[list[str], Any]:
     faults: list[str] = []
     value: Any = REFUSED
-    began = time.perf_counter()
+    began = time.process_time()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -228,7 +239,7 @@ def _verdict_of(call: Callable[[], Any]) -> tuple[list[str], Any]:
             # PanicException of the Rust module.
             faults.append(f"{type(error).__name__}: {str(error)[:80]}")
     faults += [f"{w.category.__name__}: {str(w.message)[:80]}" for w in caught[:2]]
-    if Alarm.rung and time.perf_counter() - began > SLOW:
+    if Alarm.rung and time.process_time() - began > SLOW:
         faults.append(f"not stopped within {SLOW:g} s")
     return faults, value
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -112,7 +113,11 @@ class XYStage:
         object.__setattr__(self, "most_behind", _core.as_count("most_behind", self.most_behind))
         _ = self._core
 
-    @property
+    def __getstate__(self) -> dict[str, Any]:
+        # Without the cache: the core's stage cannot be pickled.
+        return {name: value for name, value in vars(self).items() if name != "_core"}
+
+    @cached_property
     def _core(self) -> CoreStage:
         """The stage in the core, which checks every number."""
         missed = (self.missed_ticks, self.most_behind)

@@ -42,18 +42,21 @@ struct PyXyStage {
 }
 
 impl PyXyStage {
-    /// The axes between their amplifiers and sensors, and where an experiment starts, after visits
-    /// to voltages if there are any.
+    /// The axes between their amplifiers and sensors.
+    fn apparatus(&self) -> TwoAxes<'_, Stage, Stage> {
+        let Self { axes: [x, y], cross_talk, lag, missed } = self;
+        let (x, y) = (x.apparatus(), y.apparatus());
+        TwoAxes { x, y, cross_talk: *cross_talk, lag: *lag, missed: *missed }
+    }
+
+    /// The axes, and where an experiment starts, after visits to voltages if there are any.
     fn both(
         &self,
         voltages_before: [&[f64]; 2],
     ) -> (TwoAxes<'_, Stage, Stage>, TwoStates<StageState, StageState>) {
         let [x, y] = &self.axes;
         let [before_x, before_y] = voltages_before;
-        let start = (x.start_after(before_x), y.start_after(before_y));
-        let (x, y) = (x.apparatus(), y.apparatus());
-        let Self { cross_talk, lag, missed, .. } = *self;
-        (TwoAxes { x, y, cross_talk, lag, missed }, start)
+        (self.apparatus(), (x.start_after(before_x), y.start_after(before_y)))
     }
 }
 
@@ -70,7 +73,7 @@ impl PyXyStage {
     ) -> PyResult<Self> {
         let missed = MissedTicks { chance: missed.0, most: missed.1 };
         let stage = Self { axes: [x.0, y.0], cross_talk, lag, missed };
-        stage.both(NOWHERE).0.validate().map_err(|error| raise(&error))?;
+        stage.apparatus().validate().map_err(|error| raise(&error))?;
         Ok(stage)
     }
 
