@@ -118,6 +118,14 @@ def test_the_amplifier_has_its_limits_bandwidth_and_slew() -> None:
     assert np.abs(first.applied - expected).max() < 0.05
 
 
+@pytest.mark.parametrize("bandwidth", [1e-3, 1e-9, 1e-300, 1e-306])
+def test_an_amplifier_far_slower_than_its_step_lags_by_its_time_constant(bandwidth: float) -> None:
+    slow = quiet(slew=math.inf, bandwidth=bandwidth).simulate(np.linspace(0.0, 50.0, 500), FAST)
+    # The integral of the ramp over the time constant, which is far longer than the record.
+    expected = 2 * np.pi * bandwidth * np.trapezoid(slow.u, slow.t)
+    assert slow.applied[-1] == pytest.approx(expected, rel=1e-3, abs=5e-324)
+
+
 def test_the_loop_is_rate_independent_and_a_tenth_wide() -> None:
     """What Table 1 is not: piezo hysteresis does not grow with the frequency."""
     stage = quiet(creep_weights=(0.0, 0.0, 0.0))

@@ -30,10 +30,9 @@ pub struct Amplifier {
 /// Coefficients of an amplifier that depend on the length of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct AmplifierFlow {
-    /// exp(-step / tau).
-    decay: f64,
-    /// tau / step.
-    lag: f64,
+    /// Share of a gap that is closed in a step, and share of a ramp within the step that is followed.
+    closed: f64,
+    followed: f64,
     /// Largest change in a step, V.
     most: f64,
     /// Whether the output is the command.
@@ -85,9 +84,11 @@ impl Amplifier {
     #[must_use]
     pub fn flow(&self, step: f64) -> AmplifierFlow {
         let lag = self.lag();
+        let reach = step / lag;
+        let closed = -libm::expm1(-reach);
         AmplifierFlow {
-            decay: if lag > 0.0 { libm::exp(-step / lag) } else { 0.0 },
-            lag: lag / step,
+            closed,
+            followed: if reach < SHORT { followed_of_short(reach) } else { 1.0 - closed / reach },
             most: self.slew * step,
             ideal: lag == 0.0 && self.slew == f64::INFINITY,
         }
@@ -104,11 +105,19 @@ impl Amplifier {
             return (from, to);
         }
         let number = |value: f64| output.like(value);
-        // Behind a ramp the output settles to trail by `trail`; the rest of the gap decays.
-        let trail = (to - from) * number(flow.lag);
-        let gap = (from - output - trail) * number(flow.decay) + trail;
         let most = number(flow.most);
-        let change = (to - gap - output).larger(-most).smaller(most);
-        (output, output + change)
+        let change = (from - output) * number(flow.closed) + (to - from) * number(flow.followed);
+        (output, output + change.larger(-most).smaller(most))
     }
+}
+
+/// Steps over the time constant below which their ramp is followed by the power series, whose next
+/// term is below the rounding of the first.
+const SHORT: f64 = 1e-2;
+
+/// `1 - (1 - exp(-s)) / s = s/2! - s^2/3! + ... - s^6/7!`, without the difference of nearly equal
+/// numbers.
+fn followed_of_short(s: f64) -> f64 {
+    s / 2.0
+        * (1.0 - s / 3.0 * (1.0 - s / 4.0 * (1.0 - s / 5.0 * (1.0 - s / 6.0 * (1.0 - s / 7.0)))))
 }
