@@ -22,7 +22,19 @@ const INDEPENDENT: f64 = 1e-10;
 ///
 /// An unknown whose column is 0, or depends on others in use, stays as near to 0 as it may.
 #[must_use]
-pub fn bounded(mut a: DMatrix<f64>, b: &DVector<f64>, bounds: &[(f64, f64)]) -> DVector<f64> {
+pub fn bounded(a: DMatrix<f64>, b: &DVector<f64>, bounds: &[(f64, f64)]) -> DVector<f64> {
+    bounded_near(a, b, bounds, &[])
+}
+
+/// [`bounded`] beginning with the unknowns that `near` has between their bounds: those near the
+/// solution make it one of few steps.
+#[must_use]
+pub fn bounded_near(
+    mut a: DMatrix<f64>,
+    b: &DVector<f64>,
+    bounds: &[(f64, f64)],
+    near: &[f64],
+) -> DVector<f64> {
     let n = a.ncols();
     let scale: Vec<f64> = a.column_iter().map(|column| column.norm()).collect();
     for (mut column, &norm) in a.column_iter_mut().zip(&scale) {
@@ -35,10 +47,21 @@ pub fn bounded(mut a: DMatrix<f64>, b: &DVector<f64>, bounds: &[(f64, f64)]) -> 
     let (low, high): (Vec<f64>, Vec<f64>) =
         (0..n).map(|j| (of(j).0 * factor(j), of(j).1 * factor(j))).unzip();
     // min and max, not clamp, which panics where bounds cross.
-    let x = DVector::from_fn(n, |j, _| f64::min(f64::max(0.0, low[j]), high[j]));
+    let within = |j: usize, x: f64| f64::min(f64::max(x, low[j]), high[j]);
+    let beginning = |j: usize, _| within(j, near.get(j).map_or(0.0, |x| x * factor(j)));
+    let nearest = DVector::from_fn(n, |j, _| within(j, 0.0));
+    let x = DVector::from_fn(n, beginning);
     let mut set = Set { a, b, low, high, passive: Vec::new(), x };
-    for j in (0..n).filter(|&j| scale[j] > 0.0) {
-        if set.low[j] < set.x[j] && set.x[j] < set.high[j] {
+    let free = |set: &Set<'_>| -> Vec<usize> {
+        let open = |&j: &usize| set.low[j] < set.x[j] && set.x[j] < set.high[j];
+        (0..n).filter(|&j| scale[j] > 0.0).filter(open).collect()
+    };
+    set.passive = free(&set);
+    if set.least_squares().is_none() {
+        // Some depend on others: one by one.
+        set.x = nearest;
+        set.passive.clear();
+        for j in free(&set) {
             set.passive.push(j);
             if set.least_squares().is_none() {
                 set.passive.pop();

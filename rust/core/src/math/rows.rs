@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 use pulp::{Simd, WithSimd};
 
-use super::bounded_least_squares::bounded;
+use super::bounded_least_squares::bounded_near;
 use super::dispatch::dispatch_fused;
 
 /// A least squares problem `min |A x - b|`, its rows `[A b]` compressed as they come.
@@ -79,11 +79,17 @@ impl Rows {
     /// The unknowns, each between its bounds.
     #[must_use]
     pub fn solve(&mut self, bounds: &[(f64, f64)]) -> Vec<f64> {
+        self.solve_near(bounds, &[])
+    }
+
+    /// The same, beginning with those of `near`.
+    #[must_use]
+    pub fn solve_near(&mut self, bounds: &[(f64, f64)], near: &[f64]) -> Vec<f64> {
         self.compress();
         let rows = DMatrix::from_row_slice(self.columns, self.columns, &self.triangle);
         let unknowns = self.columns - 1;
         let (a, b) = (rows.columns(0, unknowns).into_owned(), rows.column(unknowns).into_owned());
-        bounded(a, &b, bounds).as_slice().to_vec()
+        bounded_near(a, &b, bounds, near).as_slice().to_vec()
     }
 
     /// Takes the block into the triangle.
