@@ -15,7 +15,7 @@ from ..fitted.start import same_beginning, start_after, start_at_jump
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from ...data.dataset import Dataset
     from ...stages.motion import StageState
@@ -180,27 +180,27 @@ def _size(model: IdentifiedModel, value: Value) -> float:
     return size
 
 
-def gradient(model: IdentifiedModel, quantity: Callable[[IdentifiedModel], float]) -> Array:
-    """Differentiate a quantity of an identified model by the values that were fitted.
+def gradient(model: IdentifiedModel, quantity: Callable[[IdentifiedModel], ArrayLike]) -> Array:
+    """Differentiate quantities of an identified model by the values that were fitted.
 
     Parameters
     ----------
     model : IdentifiedModel
         The model.
     quantity : callable
-        Of a model beside it.
+        Of a model beside it, one or m of them.
 
     Returns
     -------
-    ndarray, shape (p,)
+    ndarray, shape (p,) or (p, m)
         Change with each of `fitted_values`; 0 where there is no such stage beside it.
     """
     slopes = []
     for value in fitted_values(model):
         size = STEP * abs(value.of(model))
         ends = [moved(model, [value], np.array([way * size])) for way in (1.0, -1.0)]
-        up, down = (np.nan if one is None else quantity(one) for one in ends)
-        slopes.append((up - down) / (2.0 * size) if size else 0.0)
+        up, down = (np.asarray(np.nan if one is None else quantity(one)) for one in ends)
+        slopes.append((up - down) / (2.0 * size) if size else 0.0 * up)
     return np.asarray(np.nan_to_num(np.array(slopes, dtype=np.float64)))
 
 

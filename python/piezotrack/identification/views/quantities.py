@@ -70,7 +70,8 @@ def of_stage(model: IdentifiedModel) -> list[Row]:
     stage = model.model
     rows = [*_loop(model), *_creep(model)]
     if lag := 1e3 * _lag(stage):
-        known = (half := _half_width(model, _lag, 1e3)) < UNKNOWN * lag or math.isinf(half)
+        half = 1e3 * _half_width(model, _lag)
+        known = half < UNKNOWN * lag or math.isinf(half)
         certainty = _half(half) + " ms" if known else " ms, not determined by this record"
         rows.append(("lag", f"{lag:.3g}{certainty}"))
     if getattr(stage, "frequency", None) is not None:
@@ -196,27 +197,35 @@ def _loop(model: IdentifiedModel) -> list[Row]:
     if unit == "m/N":
         unit, scale = "um/N", 1e6
     ends = model.drive_range or (0.0, 0.0)
-    gain = _reach(model, lambda stage: SlowLoop.of(stage, *ends).gain, scale)
+
+    def gain_and_width(stage: Any) -> tuple[float, float]:
+        near = SlowLoop.of(stage, *ends)
+        return near.gain, near.width_percent
+
+    of_gain, of_width = _half_widths(model, gain_and_width, 2)
+    gain, width = _half(scale * of_gain), _half(of_width)
     rows = [("gain", f"{scale * loop.gain:.4g}{gain} {unit}")]
     if loop.width > CLOSED * abs(loop.travel):
-        width = _reach(model, lambda stage: SlowLoop.of(stage, *ends).width_percent)
         share = f"{loop.width_percent:.3g}{width} % of the travel"
         rows.append(("hysteresis", f"{share}, {length_text(loop.width, 3)}"))
     return rows
 
 
-def _reach(model: IdentifiedModel, quantity: Callable[[Any], float], scale: float = 1.0) -> str:
-    """Write half of the 95 % interval of a quantity of the stage; empty where it is not known."""
-    return _half(_half_width(model, quantity, scale))
+def _half_width(model: IdentifiedModel, quantity: Callable[[Any], float]) -> float:
+    """Return half of the 95 % interval of a quantity of the stage, infinite where not known."""
+    (half,) = _half_widths(model, lambda stage: (quantity(stage),), 1)
+    return half
 
 
-def _half_width(model: IdentifiedModel, quantity: Callable[[Any], float], scale: float) -> float:
-    """Return half of the 95 % interval of a quantity, infinite where it is not known."""
+def _half_widths(
+    model: IdentifiedModel, quantities: Callable[[Any], tuple[float, ...]], count: int
+) -> list[float]:
+    """Return the same of so many quantities."""
     covariance = model.covariance
     if covariance is None or model.drive_range is None:
-        return math.inf
-    slopes = gradient(model, lambda near: quantity(near.model))
-    return scale * float(covariance.reach(slopes, LEVEL))
+        return [math.inf] * count
+    slopes = gradient(model, lambda near: quantities(near.model))
+    return [float(covariance.reach(column, LEVEL)) for column in slopes.reshape(-1, count).T]
 
 
 def _lag(stage: Any) -> float:
@@ -233,7 +242,7 @@ def _creep(model: IdentifiedModel) -> list[Row]:
     if not parts:
         return []
     each = ", ".join(f"{100.0 * w:.2g} % in {t:.3g} s" for w, t in parts)
-    reach = _reach(model, lambda stage: math.fsum(stage.creep_weights), 100.0)
+    reach = _half(100.0 * _half_width(model, lambda stage: math.fsum(stage.creep_weights)))
     whole = f"{100.0 * math.fsum(w for w, _ in parts):.2g}{reach} %"
     return [("creep", f"{whole}: {each}" if len(parts) > 1 else f"{whole} in {parts[0][1]:.3g} s")]
 
