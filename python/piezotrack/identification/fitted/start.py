@@ -395,9 +395,18 @@ def least_voltage(cost: Callable[[float], float], ends: tuple[float, float]) -> 
     best = int(np.argmin([cost(float(volts)) for volts in grid]))
     left, right = float(grid[max(best - 1, 0)]), float(grid[min(best + 1, GRID - 1)])
     share = (5.0**0.5 - 1.0) / 2.0
-    for _ in range(SECTIONS):
-        inner = (right - share * (right - left), left + share * (right - left))
-        left, right = (left, inner[1]) if cost(inner[0]) < cost(inner[1]) else (inner[0], right)
+    lower, upper = right - share * (right - left), left + share * (right - left)
+    of_lower, of_upper = cost(lower), cost(upper)
+    for _ in range(SECTIONS - 1):
+        if of_lower < of_upper:
+            right, upper, of_upper = upper, lower, of_lower
+            lower = right - share * (right - left)
+            of_lower = cost(lower)
+        else:
+            left, lower, of_lower = lower, upper, of_upper
+            upper = left + share * (right - left)
+            of_upper = cost(upper)
+    left, right = (left, upper) if of_lower < of_upper else (lower, right)
     return 0.5 * (left + right)
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..fitted.identification import Identification
     from ..problem.problem import Problem
 
-__all__ = ["with_rest", "with_rest_tried"]
+__all__ = ["voltage_of_rest", "with_rest", "with_rest_tried"]
 
 # Voltages of rest with a fit each.
 COARSE = 9
@@ -62,8 +62,14 @@ def with_rest_tried(
     return jumped if jumped.cost < (1.0 - GAIN) * before else fit
 
 
+def voltage_of_rest(fit: Identification) -> float | None:
+    """Return the voltage [V] at which a stage was at rest until the drive jumped, if it was."""
+    rests = fit.start is not None and fit.start.history == "rest"
+    return fit.start.voltage if rests and fit.start is not None else None
+
+
 def with_rest(
-    problem: Problem, identify: Callable[[Problem], Identification], voltage: float = 0.0
+    problem: Problem, identify: Callable[[Problem], Identification], known: float | None = None
 ) -> Identification:
     """Identify a stage that was at rest until the drive jumped to the first sample.
 
@@ -75,8 +81,9 @@ def with_rest(
         The problem, of one record.
     identify : callable
         What solves a problem.
-    voltage : float, optional
-        Voltage [V] to begin with.
+    known : float, optional
+        Voltage of rest [V] that another fit has shown, about which it is searched; 0 V, and a
+        grid where that is far off, without.
 
     Returns
     -------
@@ -92,8 +99,8 @@ def with_rest(
     if len(problem.records) > 1:
         raise ParameterError("history", "'rest'", "another one of several records")
     data = problem.records[0].data
-    fit = _at_rest(problem, identify, voltage)
-    if carried_by_first_samples(_left(fit, fit.data)):
+    fit = _at_rest(problem, identify, 0.0 if known is None else known)
+    if known is None and carried_by_first_samples(_left(fit, fit.data)):
         begun = _begun(problem)
         grid = np.linspace(*_voltages(data), COARSE)
         costs = [_at_rest(begun, identify, float(volts)).cost for volts in grid]
@@ -126,15 +133,15 @@ def best_voltage(fit: Identification, data: Dataset) -> float | None:
         The voltage [V]; None where none lowers the residual by 2 %.
     """
 
-    def cost(volts: float) -> float:
-        state = start_at_jump(fit.model, data, volts).state
-        run = fit.model.simulate(data.full.u, data.dt, hold=data.hold, initial=state)
-        left = data.counted(data.y - run.x[data.warmup :])[1:]
+    def cost(volts: float, data: Dataset = data) -> float:
+        start = start_at_jump(fit.model, data, volts)
+        own = replace(fit.records[0], start=start)
+        left = _left(replace(fit, start=start, records=(own,)), data)[1:]
         return float(np.std(left) if fit.offset_fitted else np.sqrt(np.mean(left**2)))
 
-    volts = least_voltage(cost, _voltages(data))
-    known = fit.start.voltage if fit.start and fit.start.voltage is not None else 0.0
-    return volts if cost(volts) < (1.0 - GAIN) * cost(known) else None
+    first = _first(data)
+    volts = least_voltage(lambda volts: cost(volts, first), _voltages(data))
+    return volts if cost(volts) < (1.0 - GAIN) * cost(voltage_of_rest(fit) or 0.0) else None
 
 
 def _left(fit: Identification, data: Dataset) -> NDArray[np.float64]:
@@ -152,10 +159,12 @@ def _voltages(data: Dataset) -> tuple[float, float]:
 def _begun(problem: Problem) -> Problem:
     """Return the problem of the first part of a long record."""
     (record,) = problem.records
-    data = record.data
-    if len(data) <= FIRST:
-        return problem
-    return replace(problem, records=(replace(record, data=data[: float(data.t[FIRST])]),))
+    return replace(problem, records=(replace(record, data=_first(record.data)),))
+
+
+def _first(data: Dataset) -> Dataset:
+    """Return the first part of a long record."""
+    return data if len(data) <= FIRST else data[: float(data.t[FIRST])]
 
 
 def _at_rest(

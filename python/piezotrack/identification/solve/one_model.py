@@ -35,7 +35,11 @@ HISTORIES, SWARM = (2.0, 1.0), (9.0, 1.0)
 
 
 def identify_model(
-    problem: Problem, method: Method, run: Run, start: Structure | None = None
+    problem: Problem,
+    method: Method,
+    run: Run,
+    start: Structure | None = None,
+    rest: float | None = None,
 ) -> Identification:
     """Identify one model, by its method.
 
@@ -49,6 +53,9 @@ def identify_model(
         How it is run.
     start : Structure, optional
         Structure that least squares begin with.
+    rest : float, optional
+        Voltage [V] at which another model has shown the stage at rest, until the drive jumped to
+        the first sample.
 
     Returns
     -------
@@ -61,16 +68,16 @@ def identify_model(
         As for `identify`.
     """
 
-    def identify(other: Problem, start: Structure | None, voltage: float = 0.0) -> Identification:
+    def identify(other: Problem, start: Structure | None, rest: float | None) -> Identification:
         def plain(one: Problem) -> Identification:
             return _identify(one, method, run, start)
 
-        if any(record.history == "rest" for record in other.records):
-            return with_rest(other, plain, voltage)
+        if rest is not None or any(record.history == "rest" for record in other.records):
+            return with_rest(other, plain, rest)
         fit = plain(other)
         return with_rest_tried(other, fit, plain) if len(other.records) == 1 else fit
 
-    return with_delay_tried(problem, method, start, identify)
+    return with_delay_tried(problem, method, start, rest, identify)
 
 
 def _identify(

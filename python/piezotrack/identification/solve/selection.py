@@ -18,6 +18,7 @@ from ...errors import DataError, NumericalError
 from ...stages.registry import model_named
 from ..fitted.selection import Selection, Trial
 from ..methods.least_squares import LeastSquares
+from .jump import voltage_of_rest
 from .one_model import identify_model
 from .weights import Structure
 
@@ -60,6 +61,8 @@ LEAST_SAMPLES = 100
 # A residual of so many times the noise, on what was not fitted, is good enough to try no more; one
 # of so many times is good enough to search none.
 AS_NOISE, NEAR_NOISE = 1.5, 2.0
+# A fit to the whole records that leaves so many times the noise is not made anew.
+NOTHING_BUT_NOISE = 1.2
 # Correlation of residuals up to so many samples apart that is that of noise; and what chance makes
 # of it, in standard deviations.
 APART, CORRELATED, CHANCE = 10, 0.1, 4.0
@@ -127,17 +130,26 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
         raise trials.refused or DataError("no model could be fitted")
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
 
-    def whole(info: ModelInfo) -> Identification:
-        return identify_model(trials.whole(problem, info), methods.method(info), run)
+    def whole(one: Tried) -> Identification:
+        problem_of_it, method = trials.whole(problem, one.info), methods.method(one.info)
+        if one.start is None:
+            return identify_model(problem_of_it, method, run, rest=one.rest)
+        # The structure of the first part is that of the whole where nothing but noise is left.
+        kept = replace(one.start, kept=True)
+        fit = identify_model(problem_of_it, method, run, kept, one.rest)
+        if fit.cost < NOTHING_BUT_NOISE * min(fit.noises):
+            return fit
+        anew = identify_model(problem_of_it, method, run)
+        return anew if anew.cost < fit.cost else fit
 
     with shares.begin(len(infos)):
-        fit = whole(best.info)
+        fit = whole(best)
         if fit.cost > NEAR_NOISE * max(noise_of(record.data) for record in problem.records):
             # The first part does not show all that the whole record does.
             least = (1.0 - BETTER_ON_WHOLE) * fit.cost
-            for info in trials.others(best):
+            for one in trials.others(best):
                 with suppress(DataError, NumericalError):
-                    other = whole(info)
+                    other = whole(one)
                     if other.cost < least:
                         fit, least = other, other.cost
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
@@ -151,8 +163,9 @@ class Tried:
     info: ModelInfo
     # Whether its inverse is ill-conditioned.
     ill: bool
-    # Its structure, where least squares have found it.
+    # Its structure, where least squares have found it, and the voltage of rest before a jump.
     start: Structure | None
+    rest: float | None = None
 
 
 @dataclass
@@ -167,9 +180,11 @@ class _Trials:
     refused: Exception | None = None
     # Least residual so far, in multiples of the noise.
     least: float = math.inf
-    # Structure of the first fit by least squares, and which records have a delay in it.
+    # Structure of the first fit by least squares, which records have a delay in it, and the voltage
+    # of rest from which the drive jumped.
     start: Structure | None = None
     delayed: list[bool] = field(default_factory=list)
+    rest: float | None = None
 
     def near_best(self, name: str | None) -> bool:
         """Return whether a model, if it was tried, comes near the best one."""
@@ -181,21 +196,21 @@ class _Trials:
         shown = any(self.delayed) and not info.searched
         return (_with_delays(problem, self.delayed) if shown else problem).of_model(info)
 
-    def others(self, best: Tried) -> list[ModelInfo]:
+    def others(self, best: Tried) -> list[Tried]:
         """Return the models that are fitted to the whole records beside the best one."""
         others = [
             one
             for one in sorted(self.found, key=lambda one: one.trial.rms)
             if one is not best and one.start is not None and (best.ill or not one.ill)
         ]
-        return [one.info for one in others if one.info.name != MANY_WEIGHTS][:OTHERS]
+        return [one for one in others if one.info.name != MANY_WEIGHTS][:OTHERS]
 
     def run(self, info: ModelInfo) -> bool:
         """Try a model; return whether it leaves nothing but noise."""
         begun = time.perf_counter()
         problem, method = self.problem.of_model(info), self.methods.method(info)
         try:
-            fit = identify_model(problem, method, self.how, self.start)
+            fit = identify_model(problem, method, self.how, self.start, self.rest)
             left = [
                 rest.y - fit.simulate(rest, offset=record.offset).x
                 for rest, record in zip(self.rests, fit.records, strict=True)
@@ -205,7 +220,8 @@ class _Trials:
             return False
         if isinstance(method, LeastSquares) and self.start is None:
             self.start = Structure.of(fit)
-            # The first model decides whether others have a delay.
+            # The first model decides whether others have a delay, or begin with a jump.
+            self.rest = voltage_of_rest(fit)
             self.delayed = [record.delay != 0.0 for record in fit.records]
             self.problem = _with_delays(self.problem, self.delayed)
         records = self.problem.records
@@ -219,7 +235,7 @@ class _Trials:
         seconds = time.perf_counter() - begun
         start = Structure.of(fit) if isinstance(method, LeastSquares) else None
         trial = Trial(info.name, info.title, rms, seconds)
-        self.found.append(Tried(trial, info, ill, start))
+        self.found.append(Tried(trial, info, ill, start, voltage_of_rest(fit)))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
         noise = np.array([noise_of(rest.measured) for rest in self.rests])
         counted = [rest.counted(one) for rest, one in pairs]

@@ -48,15 +48,17 @@ CHOSEN = (
 
 @dataclass(frozen=True)
 class Structure:
-    """Structure of a fit beside its signals, from which that of another model begins."""
+    """Structure of a fit beside its signals, from which that of another fit begins."""
 
     histories: list[str]
     drifts: list[float | None]
     creep_times: list[float]
     dynamics: list[float]
+    # Whether that fit is kept, and not only judged beside others.
+    kept: bool = False
 
     @classmethod
-    def of(cls, fit: Identification) -> Structure:
+    def of(cls, fit: Identification, *, kept: bool = False) -> Structure:
         """Return that of a fit by least squares."""
         model: Any = fit.model
         creep = zip(model.creep_weights, model.creep_times, strict=True)
@@ -72,6 +74,7 @@ class Structure:
             drifts=[one.drift.time if one.drift else None for one in fit.records],
             creep_times=[time for weight, time in creep if weight > 0.0],
             dynamics=[*(one for one in main if one is not None), *chain(*modes)],
+            kept=kept,
         )
 
 

@@ -108,6 +108,7 @@ struct PyStructure {
     drifts: Vec<Option<f64>>,
     creep_times: Vec<f64>,
     dynamics: Vec<f64>,
+    kept: bool,
 }
 
 impl PyStructure {
@@ -124,7 +125,7 @@ impl PyStructure {
             _ => Dynamics::None,
         };
         let records = histories?.into_iter().zip(self.drifts).collect();
-        Ok(Structure { records, creep_times: self.creep_times, dynamics })
+        Ok(Structure { records, creep_times: self.creep_times, dynamics, kept: self.kept })
     }
 }
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ....errors import DataError, NumericalError
 from ...methods.least_squares import LeastSquares
+from ..jump import voltage_of_rest
 from ..weights import Structure
 
 if TYPE_CHECKING:
@@ -29,7 +30,8 @@ def with_delay_tried(
     problem: Problem,
     method: Method,
     start: Structure | None,
-    identify: Callable[..., Identification],
+    rest: float | None,
+    identify: Callable[[Problem, Structure | None, float | None], Identification],
 ) -> Identification:
     """Solve a problem, with a delay of each record where nothing is given and one is shown.
 
@@ -41,6 +43,8 @@ def with_delay_tried(
         Its method; delays are tried by least squares whose dynamics are chosen from the record.
     start : Structure, optional
         Structure that least squares begin with.
+    rest : float or None
+        Voltage of rest [V] that another model has shown.
     identify : callable
         What solves a problem from a structure, and from a voltage of rest.
 
@@ -49,24 +53,22 @@ def with_delay_tried(
     Identification
         The one with delays where these lower the cost by 5 %.
     """
-    fit = identify(problem, start)
+    fit = identify(problem, start, rest)
     given = any(record.delay is not None for record in problem.records)
     if given or not isinstance(method, LeastSquares) or method.dynamics != "auto":
         return fit
     noise = min(fit.noises)
     if fit.cost <= NOISY * noise:
         return fit
-    records = [replace(record, delay=True) for record in problem.records]
-    voltage = 0.0
-    if fit.start is not None and fit.start.history == "rest" and fit.start.voltage is not None:
-        records[0], voltage = replace(records[0], history="rest"), fit.start.voltage
-    delayed = replace(problem, records=tuple(records))
+    records = tuple(replace(record, delay=True) for record in problem.records)
+    delayed, rest = replace(problem, records=records), voltage_of_rest(fit)
     least = (1.0 - GAIN) * fit.cost
     try:
         resumes = start is not None or fit.cost < NEAR * noise
-        late = identify(delayed, Structure.of(fit) if resumes else None, voltage)
+        kept = start is not None and start.kept
+        late = identify(delayed, Structure.of(fit, kept=kept) if resumes else None, rest)
         if resumes and start is None and late.cost < least:
-            late = identify(delayed, None, voltage)
+            late = identify(delayed, None, rest)
     except (DataError, NumericalError):
         return fit
     return late if late.cost < least else fit

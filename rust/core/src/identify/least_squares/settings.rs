@@ -27,6 +27,9 @@ pub struct Structure {
     pub creep_times: Vec<f64>,
     /// Dynamics.
     pub dynamics: Dynamics,
+    /// Whether the fit is kept, and not only judged beside others: to its last digits then, and
+    /// with the lags that explain the records as well.
+    pub kept: bool,
 }
 
 /// Thresholds of plays, or levels of a grid.

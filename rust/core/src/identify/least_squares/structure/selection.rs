@@ -59,8 +59,7 @@ pub(in crate::identify::least_squares) fn search<'a>(
     let chosen = choose(&few, settings)?;
     common.count(few.evaluations());
     let mut fit = chosen.on(common);
-    if settings.start.is_some() {
-        // A trial of many, which is judged and not kept.
+    if settings.start.as_ref().is_some_and(|start| !start.kept) {
         fit.settle(ROUGH)?;
     } else {
         fit.settle(1e-4)?;
@@ -188,7 +187,7 @@ fn resumed<'a>(mut fit: Fit<'a>, settings: &Settings, start: &Structure) -> Opti
     choose_nodes(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
-    Some(fit)
+    if start.kept { with_range_of_lags(fit, settings) } else { Some(fit) }
 }
 
 /// History, creep, drifts and dynamics, one after the other, from a fit with a history that is held,
