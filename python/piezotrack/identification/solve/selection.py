@@ -130,16 +130,20 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
         raise trials.refused or DataError("no model could be fitted")
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
 
+    def begun(one: Tried, start: Structure | None) -> Identification:
+        """Fit a model to the whole records from the structure of their first parts."""
+        method = methods.method(one.info)
+        return identify_model(trials.whole(problem, one.info), method, run, start, one.rest)
+
     def whole(one: Tried) -> Identification:
-        problem_of_it, method = trials.whole(problem, one.info), methods.method(one.info)
         if one.start is None:
-            return identify_model(problem_of_it, method, run, rest=one.rest)
+            return begun(one, None)
         # The structure of the first part is that of the whole where nothing but noise is left.
-        kept = replace(one.start, kept=True)
-        fit = identify_model(problem_of_it, method, run, kept, one.rest)
+        fit = begun(one, replace(one.start, kept=True))
         if fit.cost < NOTHING_BUT_NOISE * min(fit.noises):
             return fit
-        anew = identify_model(problem_of_it, method, run)
+        method = methods.method(one.info)
+        anew = identify_model(trials.whole(problem, one.info), method, run)
         return anew if anew.cost < fit.cost else fit
 
     with shares.begin(len(infos)):
@@ -149,8 +153,7 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
             least = (1.0 - BETTER_ON_WHOLE) * fit.cost
             for one in trials.others(best):
                 with suppress(DataError, NumericalError):
-                    other = whole(one)
-                    if other.cost < least:
+                    if begun(one, one.start).cost < least and (other := whole(one)).cost < least:
                         fit, least = other, other.cost
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
 
@@ -220,8 +223,10 @@ class _Trials:
             return False
         if isinstance(method, LeastSquares) and self.start is None:
             self.start = Structure.of(fit)
-            # The first model decides whether others have a delay, or begin with a jump.
-            self.rest = voltage_of_rest(fit)
+            # The first model decides whether others have a delay and, where it is near the noise,
+            # whether they begin with a jump: one that is not may take for a jump what it lacks.
+            if fit.cost < NEAR_NOISE * min(fit.noises):
+                self.rest = voltage_of_rest(fit)
             self.delayed = [record.delay != 0.0 for record in fit.records]
             self.problem = _with_delays(self.problem, self.delayed)
         records = self.problem.records

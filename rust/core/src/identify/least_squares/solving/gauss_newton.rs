@@ -84,7 +84,9 @@ impl Fit<'_> {
         };
         let layout = self.layout();
         let bounds = self.bounds();
-        let mut x = rows.solve_near(&bounds, &self.x);
+        // Other unknowns than weights begin at 0: one that nothing determines stays there.
+        let weights = layout.weights();
+        let mut x = rows.solve_near(&bounds, &self.x[weights.clone()]);
         // Sums beyond their bounds are held there, one more each time.
         let sums = layout.sums();
         for _ in 0..sums.len() {
@@ -99,7 +101,7 @@ impl Fit<'_> {
             let stiff = STIFF * rows.size();
             row[part].fill(stiff);
             rows.push(&row, stiff * bound);
-            x = rows.solve_near(&bounds, &x);
+            x = rows.solve_near(&bounds, &x[weights.clone()]);
         }
         // A number that may only move so far in one step goes on in the next.
         let moving = |still: bool, part: Range<usize>| if still { 0..0 } else { part };
