@@ -69,6 +69,17 @@ def test_the_voltage_of_rest_is_found() -> None:
     assert fit.cost < 1.1 * NOISE
 
 
+def test_the_voltage_of_rest_is_found_beside_a_drift() -> None:
+    """Between the voltages that are tried first, where the weights stand for what is missed."""
+    log = jumping(before=40.0)
+    drifting = pt.Dataset(u=log.u, y=log.y + 0.5e-6 * np.exp(-T / 1.5), dt=DT)
+    fit = pt.identify(drifting, "prandtl-ishlinskii", drift=True, progress=False)
+    assert fit.start is not None
+    assert fit.start.voltage == pytest.approx(40.0, abs=1.0)
+    assert fit.cost < 1.1 * NOISE
+    assert fit.score(other_motion(), history="virgin").rms < 8.0 * NOISE
+
+
 @pytest.mark.parametrize(("first", "told"), [(0.0018, False), (0.5, False), (20.0, True)])
 def test_a_small_step_to_the_first_sample_is_no_jump(first: float, told: bool) -> None:
     u = first + 37.5 * (1.0 - np.cos(6.0 * np.pi * T))

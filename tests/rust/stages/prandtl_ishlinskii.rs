@@ -230,7 +230,11 @@ fn the_solution_satisfies_kuhn_and_tucker() {
             rows.push(&row, b[i]);
         }
     }
-    for (one, other) in rows.solve(&[NOT_NEGATIVE; 6]).iter().zip(x.iter()) {
-        assert!((one - other).abs() < 1e-12);
+    // Also from wherever it begins.
+    let near: Vec<f64> = x.iter().map(|value| 1.1 * value).collect();
+    for beginning in [&[][..], &near, &[1e3; 6], &[-1.0, 1.0, 0.0, 2.0, -1e9, 1e9]] {
+        for (one, other) in rows.solve_near(&[NOT_NEGATIVE; 6], beginning).iter().zip(x.iter()) {
+            assert!((one - other).abs() < 1e-12);
+        }
     }
 }

@@ -376,7 +376,11 @@ def begin(
     return start_after(model, data, best.history)
 
 
-def least_voltage(cost: Callable[[float], float], ends: tuple[float, float]) -> float:
+def least_voltage(
+    cost: Callable[[float], float],
+    ends: tuple[float, float],
+    counts: tuple[int, int] = (GRID, SECTIONS),
+) -> float:
     """Search a range for the voltage of least cost: a grid, then golden sections about its best.
 
     Parameters
@@ -385,19 +389,21 @@ def least_voltage(cost: Callable[[float], float], ends: tuple[float, float]) -> 
         Cost of a voltage [V].
     ends : (float, float)
         The range [V].
+    counts : (int, int), optional
+        Voltages of the grid, and sections.
 
     Returns
     -------
     float
         The voltage [V].
     """
-    grid = np.linspace(*ends, GRID)
+    grid = np.linspace(*ends, counts[0])
     best = int(np.argmin([cost(float(volts)) for volts in grid]))
-    left, right = float(grid[max(best - 1, 0)]), float(grid[min(best + 1, GRID - 1)])
+    left, right = float(grid[max(best - 1, 0)]), float(grid[min(best + 1, len(grid) - 1)])
     share = (5.0**0.5 - 1.0) / 2.0
     lower, upper = right - share * (right - left), left + share * (right - left)
     of_lower, of_upper = cost(lower), cost(upper)
-    for _ in range(SECTIONS - 1):
+    for _ in range(counts[1] - 1):
         if of_lower < of_upper:
             right, upper, of_upper = upper, lower, of_lower
             lower = right - share * (right - left)

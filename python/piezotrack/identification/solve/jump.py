@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["voltage_of_rest", "with_rest", "with_rest_tried"]
 
-# Voltages of rest with a fit each.
-COARSE = 9
+# Voltages of rest with a fit each, spread and about the best of these.
+COARSE, ABOUT = 9, 6
 # Samples of the beginning of a record on which they are compared.
 FIRST = 1500
 # Fits with a voltage of rest that was found from the one before, at most.
@@ -64,8 +64,8 @@ def with_rest_tried(
 
 def voltage_of_rest(fit: Identification) -> float | None:
     """Return the voltage [V] at which a stage was at rest until the drive jumped, if it was."""
-    rests = fit.start is not None and fit.start.history == "rest"
-    return fit.start.voltage if rests and fit.start is not None else None
+    start = fit.start
+    return start.voltage if start is not None and start.history == "rest" else None
 
 
 def with_rest(
@@ -102,15 +102,16 @@ def with_rest(
     fit = _at_rest(problem, identify, 0.0 if known is None else known)
     if known is None and carried_by_first_samples(_left(fit, fit.data)):
         begun = _begun(problem)
-        grid = np.linspace(*_voltages(data), COARSE)
-        costs = [_at_rest(begun, identify, float(volts)).cost for volts in grid]
-        best = _at_rest(problem, identify, float(grid[int(np.argmin(costs))]))
+        volts = least_voltage(
+            lambda volts: _at_rest(begun, identify, volts).cost, _voltages(data), (COARSE, ABOUT)
+        )
+        best = _at_rest(problem, identify, volts)
         fit = best if best.cost < (1.0 - GAIN) * fit.cost else fit
     for _ in range(ROUNDS):
-        volts = best_voltage(fit, data)
-        if volts is None:
+        better = best_voltage(fit, data)
+        if better is None:
             break
-        other = _at_rest(problem, identify, volts)
+        other = _at_rest(problem, identify, better)
         if other.cost >= (1.0 - GAIN) * fit.cost:
             break
         fit = other
