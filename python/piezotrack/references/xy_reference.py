@@ -162,7 +162,7 @@ class XYReference:
         Raises
         ------
         ParameterError
-            The matrix is not 2 by 2, or not finite.
+            The matrix is not 2 by 2 or not finite, or the path is not finite behind it.
 
         Examples
         --------
@@ -173,7 +173,11 @@ class XYReference:
         True
         """
         rows = square_matrix("matrix", matrix)
-        shift = np.array(about) - rows @ np.array(about)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._multiplied(rows, np.array(about) - rows @ np.array(about))
+
+    def _multiplied(self, rows: Array, shift: Array) -> XYReference:
+        """Multiply the axes by a matrix, and move them."""
         starts = [
             float(axis.motion(np.zeros(1))[0][0]) if axis.origin is None else axis.origin
             for axis in self.axes
@@ -183,6 +187,10 @@ class XYReference:
         for row, axis, more in zip(rows, self.axes, shift, strict=True):
             # The range of a sum lies within the sum of the ranges.
             reach = np.sort(row[:, None] * edges, axis=1).sum(axis=0) + more
+            origin = float(row @ starts + more)
+            if not np.isfinite([*reach, origin]).all():
+                expected = "numbers with which the path stays finite"
+                raise ParameterError("matrix", quoted(rows.tolist()), expected)
             mixed.append(
                 replace(
                     axis,
@@ -191,7 +199,7 @@ class XYReference:
                     low=float(reach[0]),
                     high=float(reach[1]),
                     shortest=max(axis.shortest for axis in self.axes),
-                    origin=float(row @ starts + more),
+                    origin=origin,
                 )
             )
         return XYReference(name=f"{self.name}, mixed", x=mixed[0], y=mixed[1])
