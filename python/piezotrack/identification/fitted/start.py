@@ -12,6 +12,7 @@ import numpy as np
 from ... import _core
 from ..._support.arguments import as_numbers
 from ..._support.files.json_text import object_of, text_of
+from ..._support.line_search import least_on_line
 from ..._support.messages import quoted
 from ...errors import ParameterError
 
@@ -397,23 +398,8 @@ def least_voltage(
     float
         The voltage [V].
     """
-    grid = np.linspace(*ends, counts[0])
-    best = int(np.argmin([cost(float(volts)) for volts in grid]))
-    left, right = float(grid[max(best - 1, 0)]), float(grid[min(best + 1, len(grid) - 1)])
-    share = (5.0**0.5 - 1.0) / 2.0
-    lower, upper = right - share * (right - left), left + share * (right - left)
-    of_lower, of_upper = cost(lower), cost(upper)
-    for _ in range(counts[1] - 1):
-        if of_lower < of_upper:
-            right, upper, of_upper = upper, lower, of_lower
-            lower = right - share * (right - left)
-            of_lower = cost(lower)
-        else:
-            left, lower, of_lower = lower, upper, of_upper
-            upper = left + share * (right - left)
-            of_upper = cost(upper)
-    left, right = (left, upper) if of_lower < of_upper else (lower, right)
-    return 0.5 * (left + right)
+    points, sections = counts
+    return least_on_line(cost, np.linspace(*ends, points), sections, float)[0]
 
 
 def _beginning(data: Dataset) -> Dataset:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...._support.line_search import least_on_line
 from ....data.checks.hum import hum_lines
 from .responses import late, relaxed, ringing
 from .situation import Explained, criterion, independent_samples
@@ -122,22 +123,7 @@ def _delay(here: Situation) -> Iterator[Explained]:
 def _least(group: Callable[[float], Explained], low: float, high: float) -> Explained:
     """Search the number with which a group leaves least: a grid, then a golden section."""
     places = np.geomspace(low, high, PLACES)
-    grid = [group(float(place)) for place in places]
-    i = min(range(PLACES), key=lambda i: grid[i].squares)
-    low, high = float(places[max(i - 1, 0)]), float(places[min(i + 1, PLACES - 1)])
-    ratio = (5.0**0.5 - 1.0) / 2.0
-    left, right = high - ratio * (high - low), low + ratio * (high - low)
-    before, after = group(left), group(right)
-    for _ in range(SECTIONS):
-        if before.squares < after.squares:
-            high, right, after = right, left, before
-            left = high - ratio * (high - low)
-            before = group(left)
-        else:
-            low, left, before = left, right, after
-            right = low + ratio * (high - low)
-            after = group(right)
-    return min(grid[i], before, after, key=lambda one: one.squares)
+    return least_on_line(group, places, SECTIONS, lambda one: one.squares)[1]
 
 
 def _mode(here: Situation) -> Iterator[Explained]:
