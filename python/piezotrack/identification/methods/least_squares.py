@@ -105,6 +105,11 @@ class LeastSquares:
                 "dynamics", quoted(self.dynamics), "'auto', None, 'first' or 'second'"
             )
 
+    @property
+    def _resumes(self) -> bool:
+        """Whether the structure is chosen, and can begin with that of another fit."""
+        return self.creep == self.dynamics == "auto"
+
     def settings(self) -> dict[str, Any]:
         """Return the settings by their names."""
         return dict(vars(self))

@@ -136,7 +136,7 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
         return identify_model(trials.whole(problem, one.info), method, run, start, one.rest)
 
     def whole(one: Tried) -> Identification:
-        if one.start is None:
+        if one.start is None or not methods.weights._resumes:
             return begun(one, None)
         # The structure of the first part is that of the whole where nothing but noise is left.
         fit = begun(one, replace(one.start, kept=True))

@@ -117,7 +117,7 @@ def solve_least_squares(
         zones=_zones(settings, info),
         creep_times=_times(settings, longest),
         dynamics=settings.dynamics or "none",
-        start=start if settings.creep == settings.dynamics == "auto" else None,
+        start=start if settings._resumes else None,
         threads=threads,
     )
     model = stage_class(info)
