@@ -248,7 +248,9 @@ class _Normal:
         # A value is known to within its own size, however little a cycle says of it.
         squares = [float(np.mean(one.error**2)) for one in fitted]
         ridge = np.full(self.products.shape[0], 1e-12)
-        ridge[:count] = max(squares, default=0.0)
+        # Of a record without noise, not below what rounding leaves of the products.
+        size = self.products.shape[0] * float(np.max(np.diagonal(self.products), initial=0.0))
+        ridge[:count] = max([*squares, np.finfo(np.float64).eps * size])
         self.products += np.diag(ridge)
 
     def _of(self, i: int) -> tuple[Places, Array]:
