@@ -61,8 +61,8 @@ def tool(name: str) -> Path:
     return Path(found)
 
 
-def built(where: str) -> Path:
-    """Build wheel and source distribution of the commit from nothing; return their folder.
+def built(where: str, commit: str = "HEAD") -> Path:
+    """Build wheel and source distribution of a commit from nothing; return their folder.
 
     Always at one place: the list of crates in the wheel has the name of the folder.
     """
@@ -71,6 +71,7 @@ def built(where: str) -> Path:
     folder = WORK / "build" / "piezotrack"
     shutil.rmtree(folder, ignore_errors=True)
     run("git", "clone", "--quiet", ROOT, folder)
+    run("git", "checkout", "--quiet", run("git", "rev-parse", commit).strip(), cwd=folder)
     epoch = run("git", "log", "-1", "--format=%ct", cwd=folder).strip()
     env = {**os.environ, "SOURCE_DATE_EPOCH": epoch, "CARGO_TARGET_DIR": str(folder / "target")}
     run(BIN / "maturin", "sdist", "--out", "dist", cwd=folder, env=env)
@@ -164,20 +165,26 @@ def size() -> str:
 
 
 def same_bytes() -> str:
-    """Compare two builds of one commit byte by byte."""
-    first, second = built("first"), built("second")
-    digests = {}
-    for archive in sorted(first.iterdir()):
-        one, other = (
-            hashlib.sha256((d / archive.name).read_bytes()).hexdigest() for d in (first, second)
-        )
-        if one != other and archive.suffix == ".whl":
-            a, b = (zipfile.ZipFile(d / archive.name) for d in (first, second))
+    """Compare two builds of this commit, and two of the one before, byte by byte."""
+    return "; ".join(
+        f"{commit}: {digests(built(f'first{place}', commit), built(f'second{place}', commit))}"
+        for commit, place in (("HEAD", ""), ("HEAD~1", "-before"))
+    )
+
+
+def digests(one: Path, other: Path) -> str:
+    """Return the beginnings of the SHA-256 of two builds that are the same."""
+    told = []
+    for archive in sorted(one.iterdir()):
+        paths = [folder / archive.name for folder in (one, other)]
+        first, second = (hashlib.sha256(path.read_bytes()).hexdigest() for path in paths)
+        if first != second and archive.suffix == ".whl":
+            a, b = map(zipfile.ZipFile, paths)
             names = [n for n in a.namelist() if a.read(n) != b.read(n)]
             raise AssertionError(f"{archive.name} differs in {names or 'its order or times'}")
-        assert one == other, f"{archive.name} differs"
-        digests[archive.suffix] = one[:12]
-    return ", ".join(f"{suffix} {digest}" for suffix, digest in digests.items())
+        assert first == second, f"{archive.name} differs"
+        told.append(f"{archive.suffix} {first[:12]}")
+    return ", ".join(told)
 
 
 def bare() -> dict[str, str]:
@@ -312,7 +319,7 @@ def main(only: list[str]) -> int:
     """Run the checks and print the table; return the exit code."""
     if unknown := set(only) - CHECKS.keys():
         raise SystemExit(f"no check {', '.join(sorted(unknown))}: expected {', '.join(CHECKS)}")
-    for folder in ("first", "second", "clean"):
+    for folder in ("first", "second", "first-before", "second-before", "clean"):
         shutil.rmtree(WORK / folder, ignore_errors=True)
     rows, failed = [], False
     for name in only or CHECKS:
