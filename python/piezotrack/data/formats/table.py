@@ -32,6 +32,7 @@ __all__ = [
     "Table",
     "WrittenColumn",
     "names_interval",
+    "numbers",
     "split_matrix",
     "stated_interval",
 ]
@@ -319,7 +320,7 @@ class ChannelTable(Table):
     def _further(self, column: Column, channel: Channel) -> Array | None:
         """Read a column that is not needed; one that cannot be read is left out, with a note."""
         try:
-            return _numbers(channel.read())
+            return numbers(channel.read())
         except DataError as error:
             reason = str(error).removeprefix(f"{self.source.name}: ")
             self.columns.notes.append(f"{column} is left out: it {reason}")
@@ -329,7 +330,7 @@ class ChannelTable(Table):
         """Read one column; what is not a number is NaN."""
         channel = self.channels[column.index]
         raw = channel.read()
-        values = _numbers(raw)
+        values = numbers(raw)
         if values is None:
             raise self.source.error(
                 f"{column} holds values of type {np.asarray(raw).dtype}: expected real numbers"
@@ -341,7 +342,7 @@ class ChannelTable(Table):
         return values
 
 
-def _numbers(raw: Any) -> Array | None:
+def numbers(raw: Any) -> Array | None:
     """Convert numbers and times to float64, dates to seconds from the first one."""
     values = np.asarray(unmasked(raw))
     if values.dtype.kind == "M":

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..apart import read_apart
 from ..table import Channel, ChannelTable, Format, names_interval, split_matrix, stated_interval
-from .hdf5_heaps import check_heaps
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -27,9 +27,9 @@ LONGEST = 10_000
 EXTRA = "hdf5"
 
 
+@read_apart("h5py", EXTRA)
 def _opens(source: Source) -> ChannelTable:
     h5py = source.library("h5py", EXTRA)
-    check_heaps(source, UNIT_NAMES)
     with source.decoding("HDF5"), h5py.File(source.path, "r") as file:
         channels: list[Channel] = []
         for path, dataset in _datasets(h5py, file):
@@ -42,6 +42,7 @@ def _opens(source: Source) -> ChannelTable:
     return ChannelTable(source, channels, notes=notes if source.ending == ".mat" else [])
 
 
+@read_apart("h5py", "mat")
 def open_matlab(source: Source) -> ChannelTable:
     """Open a MAT file of version 7.3.
 
@@ -57,7 +58,6 @@ def open_matlab(source: Source) -> ChannelTable:
         the variables.
     """
     h5py = source.library("h5py", "mat")
-    check_heaps(source, ())
     with source.decoding("MAT v7.3"), h5py.File(source.path, "r") as file:
         channels: list[Channel] = []
         numbers = {}
@@ -107,12 +107,12 @@ def _of_dataset(
         columns = [one for one in names if inner[one].kind in "biuf" and not inner[one].shape]
         read = _reader(source, h5py, dataset.name, columns)
         for part in columns if len(dataset.shape) == 1 else ():
-            yield Channel(part, dataset.shape[0], partial(_part, read, part), group)
+            yield Channel(part, dataset.shape[0], partial(_part, source, read, part), group)
     elif dataset.dtype.kind in "biuf":
         read = _reader(source, h5py, dataset.name)
         dt = _interval(h5py, dataset.attrs, group)
         for column, place, count in split_matrix(name, dataset.shape):
-            yield Channel(column, count, partial(_part, read, place), group, unit, dt)
+            yield Channel(column, count, partial(_part, source, read, place), group, unit, dt)
 
 
 def _is_sound(h5py: Any, kind: Any, *, alone: bool = True) -> bool:
@@ -160,8 +160,10 @@ def _reader(
     return partial(source.latest, path, read)
 
 
-def _part(read: Callable[[], Any], place: Any) -> Any:
-    return read()[place]
+def _part(source: Source, read: Callable[[], Any], place: Any) -> Any:
+    # The rows may lack a part that their damaged type has.
+    with source.decoding("HDF5"):
+        return read()[place]
 
 
 def _unit(h5py: Any, attributes: Any) -> str | None:
@@ -177,12 +179,8 @@ def _attribute(h5py: Any, attributes: Any, name: str) -> Any:
         return ""
     attribute = attributes.get_id(name)
     kind, h5t = attribute.get_type(), h5py.h5t
-    what = kind.get_class()
-    if what not in (h5t.INTEGER, h5t.FLOAT, h5t.STRING) or kind.get_size() > LONGEST:
-        return ""
-    # A text of variable length only where its length has been checked; not a type from elsewhere.
-    unchecked = name not in UNIT_NAMES or kind.committed()
-    if what == h5t.STRING and kind.is_variable_str() and unchecked:
+    kinds = (h5t.INTEGER, h5t.FLOAT, h5t.STRING)
+    if kind.get_class() not in kinds or kind.get_size() > LONGEST:
         return ""
     return attributes[name] if attribute.get_space().get_simple_extent_npoints() == 1 else ""
 

@@ -9,6 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ...._support.messages import quoted
+from ..apart import read_apart
 from ..table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ CONVERTED = {4: {0, 1, 2, 4, 5, 6, 7, 8}, 3: {65535, 0, 1, 2, 6, 9, 11, 12}}
 REMOTE_MASTER = 8
 
 
+@read_apart("asammdf", "mdf")
 def _opens(source: Source) -> ChannelTable:
     # Byte 60: what is left to be done, which asammdf would try and print its failure.
     if b"UnFinMF" in source.head[:8] or source.head[60:62].strip(b"\0"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from ..apart import read_apart
 from ..table import Channel, ChannelTable, Format
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ EXTRA = "parquet"
 UNIT_NAMES = (b"unit", b"units")
 
 
+@read_apart("pyarrow", EXTRA)
 def _opens(source: Source) -> ChannelTable:
     parquet = source.library("pyarrow.parquet", EXTRA)
     types = source.library("pyarrow", EXTRA).types
