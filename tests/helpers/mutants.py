@@ -121,56 +121,120 @@ def models() -> list[str]:
 
 
 @cache
-def binary_logs() -> dict[str, bytes]:
+def binary_logs() -> dict[str, list[bytes]]:
     """The same log in the formats that are not text, by their endings."""
     data = pt.Dataset(u=VOLTS, y=1.2e-6 * VOLTS, t=TIMES)
     logs = {}
     with tempfile.TemporaryDirectory() as folder:
         for ending in (".npz", ".mat", ".parquet"):
-            logs[ending] = data.save(Path(folder, f"log{ending}")).read_bytes()
-        for ending, write in ((".h5", _write_hdf5), (".tdms", _write_tdms), (".mf4", _write_mdf)):
-            path = Path(folder, f"log{ending}")
-            write(path)
-            logs[ending] = path.read_bytes()
+            logs[ending] = [data.save(Path(folder, f"log{ending}")).read_bytes()]
+        for ending, write, ways in (
+            (".mat", _write_matlab, ({},)),
+            (".parquet", _write_parquet, ({}, {"compression": "zstd", "row_group_size": 16})),
+            (".h5", _write_hdf5, ({}, {"libver": "latest"})),
+            (".h5", _write_rows, ({}, {"libver": "latest"})),
+            (".tdms", _write_tdms, ({}, {"version": 4713})),
+            (".mf4", _write_mdf, ({"version": "4.10"}, {"version": "3.30"})),
+        ):
+            for options in ways:
+                path = Path(folder, f"log{ending}")
+                write(path, options)
+                logs.setdefault(ending, []).append(path.read_bytes())
     return logs
 
 
-def _write_hdf5(path: Path) -> None:
+def _write_hdf5(path: Path, options: dict[str, Any]) -> None:
+    """Datasets with texts of variable length, references and links."""
     import h5py
 
-    with h5py.File(path, "w") as file:
+    with h5py.File(path, "w", **options) as file:
         for name, values, unit in (("time", TIMES, "s"), ("u", VOLTS, "V"), ("x", VOLTS, "um")):
-            file.create_dataset(f"run/{name}", data=values, chunks=(16,), compression="gzip")
-            # Of fixed length: a damaged reference to one of variable length can hang libhdf5.
-            file[f"run/{name}"].attrs["units"] = np.bytes_(unit)
+            dataset = file.create_dataset(
+                f"run/{name}", data=values, chunks=(16,), compression="gzip"
+            )
+            # A damaged text of variable length can hang libhdf5: in one file of three.
+            dataset.attrs["units"] = unit if name == "x" else np.bytes_(unit)
+            dataset.attrs["of"] = np.array([dataset.ref], dtype=h5py.ref_dtype)
+        file["again"] = h5py.SoftLink("/run/u")
+        file["outside"] = h5py.ExternalLink("other.h5", "/u")
 
 
-def _write_tdms(path: Path) -> None:
+def _write_rows(path: Path, options: dict[str, Any]) -> None:
+    """A table of rows, and many small datasets."""
+    import h5py
+
+    kinds = [("time_s", "f8"), ("voltage_V", "f4"), ("x_um", "f8"), ("note", "S4")]
+    rows = np.zeros(TIMES.size, dtype=kinds)
+    rows["time_s"], rows["voltage_V"], rows["x_um"] = TIMES, VOLTS, VOLTS
+    with h5py.File(path, "w", **options) as file:
+        file["log"] = rows
+        file["log"].attrs["sample_rate_Hz"] = 50.0
+        for number in range(20):
+            file[f"many/{number}"] = np.arange(4)
+
+
+def _write_matlab(path: Path, options: dict[str, Any]) -> None:
+    """MAT v7.3 as MATLAB writes it: a block before HDF5, classes, a cell array, units."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512, **options) as file:
+        for name, values in (("time", TIMES), ("u", VOLTS), ("x", VOLTS), ("#refs#/a", VOLTS)):
+            file[name] = values[None]
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
+        file["cells"] = np.array([file["#refs#/a"].ref], dtype=h5py.ref_dtype)
+        file["cells"].attrs["MATLAB_class"] = np.bytes_("cell")
+        for name, unit in (("time", "s"), ("u", "V"), ("x", "um")):
+            file[f"units/{name}"] = np.array([[ord(letter)] for letter in unit], dtype="u2")
+            file[f"units/{name}"].attrs["MATLAB_class"] = np.bytes_("char")
+    content = bytearray(path.read_bytes())
+    content[:128] = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
+    path.write_bytes(content)
+
+
+def _write_parquet(path: Path, options: dict[str, Any]) -> None:
+    """Columns of numbers beside texts, lists and structures."""
+    import pyarrow
+    import pyarrow.parquet
+
+    columns = {"time_s": TIMES, "voltage_V": VOLTS.astype("f4"), "x_um": VOLTS}
+    two: dict[str, list[Any]] = {"note": ["a", "b"], "list": [[1.0], []]}
+    two["both"] = [{"a": 1}, {"a": 2}]
+    others = {name: values * (TIMES.size // 2) for name, values in two.items()}
+    pyarrow.parquet.write_table(pyarrow.table({**columns, **others}), path, **options)
+
+
+def _write_tdms(path: Path, options: dict[str, Any]) -> None:
+    """Two segments, with texts beside the numbers."""
     import nptdms
 
-    with nptdms.TdmsWriter(str(path)) as writer:
+    with nptdms.TdmsWriter(str(path), **options) as writer:
         about = {"wf_increment": 0.02}
-        channels = (("u", "V"), ("x", "um"))
-        writer.write_segment(
-            [
-                nptdms.ChannelObject("run", n, VOLTS, {**about, "unit_string": u})
-                for n, u in channels
+        for part in (slice(0, 20), slice(20, 40)):
+            channels = [
+                nptdms.ChannelObject("run", name, VOLTS[part], {**about, "unit_string": unit})
+                for name, unit in (("u", "V"), ("x", "um"))
             ]
-        )
+            writer.write_segment([*channels, nptdms.ChannelObject("run", "note", ["ab", "cde"])])
 
 
-def _write_mdf(path: Path) -> None:
+def _write_mdf(path: Path, options: dict[str, Any]) -> None:
+    """Groups of numbers, of converted numbers and of texts."""
     from asammdf import MDF, Signal
 
-    with MDF() as file:
+    with MDF(**options) as file:
         file.append([Signal(VOLTS, TIMES, name=n, unit=u) for n, u in (("u", "V"), ("x", "um"))])
-        file.save(path)
+        counts = np.arange(TIMES.size)
+        file.append([Signal(counts, TIMES, name="k", conversion={"a": 2.0, "b": 1.0})])
+        texts = np.array([b"a", b"bc"] * (TIMES.size // 2))
+        file.append([Signal(texts, TIMES, name="note", encoding="utf-8")])
+        saved = file.save(path.with_suffix(".mf4" if options["version"] >= "4" else ".mdf"))
+    Path(saved).replace(path)
 
 
 @st.composite
-def binaries(draw: Draw, right: bytes) -> bytes:
+def binaries(draw: Draw, right: list[bytes]) -> bytes:
     """A file that is not text with something changed: cut off, bytes, or a number of its sizes."""
-    content = bytearray(right)
+    content = bytearray(draw(st.sampled_from(right)))
     if draw(st.integers(0, 7)) == 0:
         del content[draw(st.integers(0, len(content))) :]
     for _ in range(draw(st.integers(1, 3))):
