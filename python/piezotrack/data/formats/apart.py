@@ -42,8 +42,9 @@ __all__ = ["read_apart", "serve"]
 
 # Time for one request [s], and bytes a second that the slowest disk gives; and for a start.
 PATIENCE, SLOWEST = 20.0, 5e6
-# Time without a request after which the process ends, and after which it is not relied on [s].
-IDLE, RELIED_ON = 60.0, 50.0
+# Time without a request after which the process ends, and after which it is not relied on [s]; and
+# that it takes to end.
+IDLE, RELIED_ON, ENDS = 60.0, 50.0, 5.0
 # Address space beyond what the samples of a file may need [bytes]: libraries reserve some.
 MARGIN = 1 << 30
 BEGUN = b"reader\n"
@@ -148,17 +149,21 @@ class _Reader:
         self.used = time.monotonic()
         return head, values
 
-    def end(self) -> None:
+    def end(self, *, at_once: bool = False) -> None:
         """End the process, where it is this one's child."""
         for pipe in self._pipes():
             with suppress(OSError):
                 pipe.close()
-        if self.owner == os.getpid():
-            self.process.kill()
-            self.process.wait()
-        else:
+        if self.owner != os.getpid():
             # Waited for by the process that started it.
             self.process.returncode = 0
+            return
+        if not at_once:
+            # It ends by itself where there are no more requests.
+            with suppress(subprocess.TimeoutExpired):
+                self.process.wait(ENDS)
+        self.process.kill()
+        self.process.wait()
 
 
 _LOCK = threading.Lock()
@@ -192,7 +197,7 @@ def _ask(source: Source, request: Request) -> tuple[dict[str, Any], Array] | Non
                 f"is not read within {request['patience']:.0f} s: expected a sound file"
             ) from None
         except BaseException:
-            _end()
+            _end(at_once=True)
             raise
     if "refused" in head:
         raise source.error(head["refused"].removeprefix(f"{source.name}: "))
@@ -201,10 +206,10 @@ def _ask(source: Source, request: Request) -> tuple[dict[str, Any], Array] | Non
     return head, values
 
 
-def _end() -> None:
+def _end(*, at_once: bool = False) -> None:
     global _reader
     if _reader is not None:
-        _reader.end()
+        _reader.end(at_once=at_once)
         _reader = None
 
 
