@@ -30,10 +30,12 @@ WORK = ROOT / "target" / "release-check"
 BIN = Path(sys.executable).parent
 LARGEST = 8_000_000
 VERSION: str = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
-# What this system cannot do, and where it is done.
+# What this system cannot do, or what takes hours, and where it is done.
 ELSEWHERE = {
     "wheels of other systems": "macOS, Windows, aarch64, musl: built and tested by release.yml",
     "newer Pythons": "3.12 to 3.15 and 3.14t: tested by release.yml",
+    "long fuzz runs": "make fuzz CALLS=500000 FILES=150000 and make fuzz-guided: by weekly.yml",
+    "coverage": "make coverage: by ci.yml",
     "uploads": "package index, crates.io, release, site: by release.yml, on a tag",
 }
 
