@@ -251,7 +251,8 @@ class Covariance:
         Returns
         -------
         float
-            In the unit of the quantity; infinite where it follows from what is not determined.
+            In the unit of the quantity; infinite where it follows from what is not determined, and
+            where its change with a value is beyond all bounds.
 
         Raises
         ------
@@ -259,13 +260,15 @@ class Covariance:
             `level` is no share.
         """
         normal = normal_reach(level)
-        variances = (gradient**2) * np.diag(self.matrix)
-        if is_hidden(self.hidden, gradient):
-            return math.inf
-        whole = float(variances.sum())
-        widening = float(variances @ self.widening) / whole if whole > 0.0 else 1.0
-        deviation = math.sqrt(max(float(gradient @ self.matrix @ gradient), 0.0))
-        return normal * widening * deviation + abs(float(gradient @ self.to_least_cost))
+        with np.errstate(over="ignore", invalid="ignore"):
+            variances = (gradient**2) * np.diag(self.matrix)
+            if is_hidden(self.hidden, gradient):
+                return math.inf
+            whole = float(variances.sum())
+            widening = float(variances @ self.widening) / whole if whole > 0.0 else 1.0
+            deviation = math.sqrt(max(float(gradient @ self.matrix @ gradient), 0.0))
+            reach = normal * widening * deviation + abs(float(gradient @ self.to_least_cost))
+        return reach if math.isfinite(reach) else math.inf
 
     def spread(self, gradients: Array) -> Array:
         """Return standard deviations of quantities, as much wider as intervals of the values are.
