@@ -264,7 +264,8 @@ def crate() -> str:
     """Pack the control crate, and build it from what is packed."""
     options = ("--quiet", "--locked", "--allow-dirty", "--target-dir", WORK / "crate")
     run("cargo", "publish", "--dry-run", *options, "--package", "piezotrack-control")
-    (packed,) = (WORK / "crate" / "package").glob("piezotrack-control-*.crate")
+    # Newer versions of cargo leave it in a folder of their own.
+    packed = next((WORK / "crate" / "package").rglob("piezotrack-control-*.crate"))
     return f"{packed.name}, {packed.stat().st_size / 1e3:.0f} kB"
 
 
