@@ -1,7 +1,7 @@
 """Reading in a process of its own, with libraries that a damaged file can hang or end.
 
-The process starts with the first file of such a format. It ends with this one, where none was read
-for a minute, and where a file takes too long; the next file starts another.
+The process starts with the first file of such a format. It ends with this one, after a minute
+without a file, and where a file takes too long; the next file starts another.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import importlib.util
 import inspect
 import json
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -42,8 +43,8 @@ __all__ = ["read_apart", "serve"]
 
 # Time for one request [s], and bytes a second that the slowest disk gives; and for a start.
 PATIENCE, SLOWEST = 20.0, 5e6
-# Time without a request after which the process ends, and after which it is not relied on [s]; and
-# that it takes to end.
+# Time without a request after which the process ends, where pipes can be waited for, and after
+# which it is not relied on [s]; and that it takes to end.
 IDLE, RELIED_ON, ENDS = 60.0, 50.0, 5.0
 # Address space beyond what the samples of a file may need [bytes]: libraries reserve some.
 MARGIN = 1 << 30
@@ -227,19 +228,18 @@ def serve() -> None:
         tables: dict[int, ChannelTable] = {}
         answers.write(BEGUN)
         answers.flush()
-        while True:
-            # It ends the process from a thread of its own, also where a library has hung it.
-            faulthandler.dump_traceback_later(IDLE, exit=True, file=nothing)
+        while os.name != "posix" or select.select([requests], [], [], IDLE)[0]:
             line = requests.readline()
             if not line:
                 break
             request = json.loads(line)
+            # It ends the process from a thread of its own, also where a library has hung it.
             faulthandler.dump_traceback_later(request["patience"], exit=True, file=nothing)
             head, samples = _answer(request, tables)
+            faulthandler.cancel_dump_traceback_later()
             answers.write(json.dumps(head).encode() + b"\n")
             answers.write(samples)
             answers.flush()
-        faulthandler.cancel_dump_traceback_later()
 
 
 def _answer(request: Request, tables: dict[int, ChannelTable]) -> tuple[dict[str, Any], bytes]:
