@@ -56,6 +56,25 @@ def test_nothing_is_replaced_before_all_are_complete(tmp_path: Path) -> None:
     assert content(tmp_path) == dict.fromkeys(NAMES, "new")
 
 
+def test_a_signal_as_the_marker_is_opened_leaves_what_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save(tmp_path, "old")
+    opened = Path.open
+
+    def interrupted(path: Path, *mode: Any, **named: Any) -> Any:
+        file = opened(path, *mode, **named)
+        if path.name == MARKER and mode == ("x",):
+            file.close()
+            raise KeyboardInterrupt
+        return file
+
+    monkeypatch.setattr(Path, "open", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        save(tmp_path, "new")
+    assert content(tmp_path) == dict.fromkeys(NAMES, "old")
+
+
 def test_a_marker_that_has_no_room_leaves_what_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

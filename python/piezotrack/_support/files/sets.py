@@ -142,11 +142,14 @@ def _rename(folder: Path, pairs: Sequence[Pair]) -> None:
     marker = folder / MARKER
     interruption: BaseException | None = None
     with _one_at_a_time:
+        was_there = marker.exists()
         try:
             others = _take(marker, pairs)
         except BaseException:
-            # Nothing has been put in place, and what was to be is removed.
-            if _is_ours(marker) and {file for _, file in _listed(folder)} <= {f for _, f in pairs}:
+            # Nothing has been put in place, and what was to be is removed. A signal may come as
+            # the marker is opened, before there is anything in it.
+            ours = _is_ours(marker) and {f for _, f in _listed(folder)} <= {f for _, f in pairs}
+            if ours or (not was_there and _is_empty(marker)):
                 marker.unlink(missing_ok=True)
             raise
         try:
@@ -267,6 +270,14 @@ def _is_ours(marker: Path) -> bool:
     """Whether this process has set a marker."""
     found = _read(marker)
     return (found.get("host"), found.get("process")) == (this_host(), os.getpid())
+
+
+def _is_empty(marker: Path) -> bool:
+    """Whether a marker has been opened and not written."""
+    try:
+        return marker.stat().st_size == 0
+    except OSError:
+        return False
 
 
 def _owner_is_gone(marker: Path) -> bool:
