@@ -27,6 +27,9 @@ use crate::signal::Hold;
 /// Parts of a sampling interval at most; the last one takes the rest.
 const MOST_PARTS: usize = 1 << 20;
 
+/// Chords that stand for a bend within a step of a plant at most, which no stage of real size needs.
+const MOST_CHORDS: f64 = 1000.0;
+
 /// Corners at one place at most: rounding may find one again and again.
 const MOST_IDLE: usize = 128;
 
@@ -171,6 +174,8 @@ pub struct InputStageFlow {
     step: f64,
     /// Largest deviation of the operator's output from the chords that stand for it, m.
     deviation: f64,
+    /// The same where the drive moves by 1 V in the step, if that is more, m/V^2.
+    coarsest: f64,
     /// Change of the drive below which one chord is close enough whatever the corners, V.
     least: f64,
 }
@@ -272,6 +277,7 @@ impl<O: Segmented> InputStage<O> {
             zero: self.zero(),
             step,
             deviation: accuracy / self.relaxation.largest_gain(),
+            coarsest: 0.0,
             least: 0.0,
         }
     }
@@ -299,8 +305,9 @@ impl<O: Segmented> InputStage<O> {
         state: &mut InputStageState<O::State>,
         volts: f64,
     ) -> usize {
-        let InputStageFlow { relaxation, zero, step, deviation, least } = flow;
+        let InputStageFlow { relaxation, zero, step, deviation, coarsest, least } = flow;
         let from = self.operator.input(&state.operator);
+        let deviation = deviation.max(coarsest * (volts - from) * (volts - from));
         if O::BY_RATE {
             self.operator.at_rate(&mut state.operator, (volts - from).abs() / *step);
             self.jump(state, from, *zero);
@@ -308,7 +315,7 @@ impl<O: Segmented> InputStage<O> {
         let (mut done, mut parts, mut idle) = (0.0, 1, 0);
         let splits = self.relaxation.remembers() && (volts - from).abs() > *least;
         while splits && parts < MOST_PARTS && idle < MOST_IDLE {
-            let next = self.operator.next_breakpoint(&state.operator, volts, *deviation);
+            let next = self.operator.next_breakpoint(&state.operator, volts, deviation);
             let reached = (next - from) / (volts - from);
             // Not a number where the drive is none.
             if reached.is_nan() || reached > 1.0 - LEAST_PART {
@@ -402,7 +409,9 @@ impl<O: Segmented> Plant for InputStage<O> {
     fn flow(&self, step: f64) -> InputStageFlow {
         let flow = self.steps(step, ACCURACY);
         // A chord across corners deviates by a quarter of slope_jump times its length at most.
-        InputStageFlow { least: 4.0 * flow.deviation / self.operator.slope_jump(), ..flow }
+        let least = 4.0 * flow.deviation / self.operator.slope_jump();
+        let coarsest = 0.125 * self.operator.largest_curvature() / (MOST_CHORDS * MOST_CHORDS);
+        InputStageFlow { least, coarsest, ..flow }
     }
 
     #[inline(always)]
