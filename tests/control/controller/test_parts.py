@@ -6,6 +6,7 @@ import math
 from dataclasses import MISSING, fields
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 import piezotrack as pt
@@ -150,3 +151,9 @@ def test_a_law_by_h_infinity_is_kept_as_one_in_state_space(tmp_path: Path) -> No
     again = pt.load_controller(loop.save(tmp_path / "loop.json"))
     assert type(again.feedback) is pt.control.StateSpace
     assert again.feedback._settings == law._settings
+
+
+def test_numbers_of_single_precision_are_taken_as_doubles() -> None:
+    law = pt.Pid(kp=np.float32(0.1e6), ti=np.float32(0.1))
+    assert (law.kp, law.ti) == (0.1e6, float(np.float32(0.1)))
+    assert {type(law.kp), type(law.ti)} == {float}

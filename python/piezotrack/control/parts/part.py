@@ -41,6 +41,10 @@ class Part:
 
     def __post_init__(self) -> None:
         _core.check_part(self.info.role, self._settings)
+        for name, value in list(vars(self).items()):
+            if isinstance(value, np.generic):
+                # Numbers of NumPy may have single precision.
+                object.__setattr__(self, name, value.item())
 
     @property
     def _values(self) -> Mapping[str, Any]:
