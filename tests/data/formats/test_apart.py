@@ -73,6 +73,16 @@ def test_another_file_may_be_opened_in_between(tmp_path: Path) -> None:
         assert np.array_equal(table.column(table.columns[0]), RIGHT)
 
 
+def test_a_file_that_is_replaced_while_it_is_read_is_refused(tmp_path: Path) -> None:
+    tables = []
+    for name in ("one", "other"):
+        (tmp_path / name).write_text("none", encoding="utf-8")
+        tables.append(opens(Source(tmp_path / name)))
+    (tmp_path / "one").write_text("none\nnone", encoding="utf-8")
+    with pytest.raises(pt.DataError, match="one: has changed while it was read"):
+        tables[0].column(tables[0].columns[0])
+
+
 def test_one_process_serves_until_it_is_idle(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -89,7 +89,7 @@ def read_apart(
             if (answer := _ask(source, request)) is None:
                 return opens(source)
             head, _ = answer
-            request["table"] = head["table"]
+            request |= {"table": head["table"], "version": head["version"]}
             channels = [
                 Channel(read=partial(_read, source, {**request, "channel": k}), **told)
                 for k, told in enumerate(head["channels"])
@@ -250,6 +250,9 @@ def _answer(request: Request, tables: dict[int, ChannelTable]) -> tuple[dict[str
         _limit_memory(MARGIN + 4 * source.most)
         # Opened again where another file was opened since.
         if (number := request.get("table", time.monotonic_ns())) not in tables:
+            version = [getattr(source.path.stat(), f"st_{what}") for what in ("mtime_ns", "size")]
+            if request.get("version", version) != version:
+                raise source.error("has changed while it was read: expected the same file")
             tables.clear()
             module, name = request["opens"]
             opens = getattr(importlib.import_module(module), name)
@@ -259,6 +262,7 @@ def _answer(request: Request, tables: dict[int, ChannelTable]) -> tuple[dict[str
             names = ("name", "count", "group", "unit", "dt")
             return {
                 "table": number,
+                "version": version,
                 "channels": [
                     {name: getattr(one, name) for name in names} for one in table.channels
                 ],
