@@ -154,6 +154,8 @@ def test_a_law_by_h_infinity_is_kept_as_one_in_state_space(tmp_path: Path) -> No
 
 
 def test_numbers_of_single_precision_are_taken_as_doubles() -> None:
-    law = pt.Pid(kp=np.float32(0.1e6), ti=np.float32(0.1))
+    gain: Any = np.float32(0.1e6)
+    time: Any = np.float32(0.1)
+    law = pt.Pid(kp=gain, ti=time)
     assert (law.kp, law.ti) == (0.1e6, float(np.float32(0.1)))
     assert {type(law.kp), type(law.ti)} == {float}

@@ -411,7 +411,7 @@ impl<O: Segmented> Plant for InputStage<O> {
         // A chord across corners deviates by a quarter of slope_jump times its length at most.
         let least = 4.0 * flow.deviation / self.operator.slope_jump();
         let coarsest = 0.125 * self.operator.largest_curvature() / (MOST_CHORDS * MOST_CHORDS);
-        InputStageFlow { least, coarsest, ..flow }
+        InputStageFlow { coarsest, least, ..flow }
     }
 
     #[inline(always)]
