@@ -6,8 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from scipy.linalg import toeplitz
+from scipy.optimize import minimize_scalar
+from scipy.signal import lfilter
 
 import piezotrack as pt
+from piezotrack import _core
 from piezotrack.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -183,3 +187,38 @@ def test_a_quantity_is_determined_where_its_single_values_are_not() -> None:
     assert "+-" in gain
     band = fit.prediction_band(log)
     assert float(band.parameters.max()) < 0.01 * fit.stroke
+
+
+def test_the_noise_is_that_of_the_largest_restricted_likelihood() -> None:
+    """The density of the residual in all directions that the fit has left, in dense matrices."""
+    n, pole = 250, 0.95
+    rng = np.random.default_rng(3)
+    t = np.arange(n) / n
+    columns = [np.cos(np.pi * k * t) for k in (1, 2)]
+    fitted = np.column_stack([*columns, np.ones(n)])
+    noise = lfilter([1.0], [1.0, -pole], rng.standard_normal(n + 500))[500:]
+    left = np.linalg.svd(fitted)[0][:, fitted.shape[1] :]
+    residual = left @ (left.T @ noise)
+
+    def correlations(first: float) -> np.ndarray:
+        return np.asarray(toeplitz(first ** np.arange(n)) / (1.0 - first**2))
+
+    def cost(first: float) -> float:
+        square = left.T @ correlations(first) @ left
+        variance = residual @ left @ np.linalg.solve(square, left.T @ residual)
+        return float((n - 3) * np.log(variance) + np.linalg.slogdet(square)[1])
+
+    first = float(minimize_scalar(cost, bounds=(0.5, 0.999), method="bounded").x)
+    square = left.T @ correlations(first) @ left
+    variance = residual @ left @ np.linalg.solve(square, left.T @ residual) / (n - 3)
+    take = np.linalg.pinv(fitted)[:2]
+    expected = variance * take @ correlations(first) @ take.T
+    record = (columns, [np.ones(n)], residual, residual, 1.0)
+    matrix, *_, orders, _ = _core.linearised_covariance([record], np.zeros((2, 2)).tolist(), 0, 0)
+    assert orders == [1]
+    assert np.array(matrix) == pytest.approx(expected, rel=0.02)
+    # Of the residual alone it has less slow noise.
+    (alone,), power = _core.autoregression(residual)
+    assert alone < first - 0.01
+    least = power * take @ correlations(alone) @ take.T
+    assert np.all(np.diag(least) < 0.8 * np.diag(expected))

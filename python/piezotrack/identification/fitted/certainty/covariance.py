@@ -80,13 +80,15 @@ class Covariance:
     r"""Covariance of the values that were fitted, for residuals that are correlated.
 
     With the change J of the displacement with each value, and the covariance G of an autoregression
-    that was fitted to the noise,
+    of the noise,
 
-    .. math:: C = \frac{n}{n - p} (J^T J)^{-1} J^T G J (J^T J)^{-1}
+    .. math:: C = (J^T J)^{-1} J^T G J (J^T J)^{-1}
 
     (Domowitz and White 1982, doi 10.1016/0304-4076(82)90012-3; Ljung 1999, System Identification,
-    section 9.4). A sieve bootstrap (Buehlmann 1997, doi 10.2307/3318584) of the linearised fit
-    gives the factor by which an interval is wider than that of normal deviations.
+    section 9.4). The autoregression has the largest restricted likelihood, which counts the noise
+    that the values took along (Cheang and Reinsel 2000, doi 10.1080/01621459.2000.10474318). A
+    sieve bootstrap (Buehlmann 1997, doi 10.2307/3318584) of the linearised fit gives the factor by
+    which an interval is wider than that of normal deviations.
 
     Attributes
     ----------

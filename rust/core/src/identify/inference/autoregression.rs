@@ -64,6 +64,41 @@ impl Autoregression {
         best
     }
 
+    /// The same, its variance times a factor.
+    pub(super) fn scaled(mut self, scale: f64) -> Self {
+        self.variance *= scale;
+        self
+    }
+
+    /// Number of its coefficients.
+    #[must_use]
+    pub fn order(&self) -> usize {
+        self.coefficients.len()
+    }
+
+    /// Coefficients of the filter that leaves the innovations, from the present sample on.
+    pub(super) fn filter(&self) -> Vec<f64> {
+        core::iter::once(1.0).chain(self.coefficients.iter().map(|a| -a)).collect()
+    }
+
+    /// Predictors of the first samples from those before them, and the variance of their errors over
+    /// that of the innovations; `None` where the noise grows. By the recursion of Levinson and Durbin.
+    pub(super) fn first(&self) -> Option<Vec<(Self, f64)>> {
+        let (mut a, mut variance) = (self.coefficients.clone(), 1.0);
+        let mut predictors = Vec::with_capacity(a.len());
+        while let Some(reflection) = a.pop() {
+            let left = 1.0 - reflection * reflection;
+            if left.is_nan() || left <= 0.0 {
+                return None;
+            }
+            a = a.iter().zip(a.iter().rev()).map(|(a, b)| (a + reflection * b) / left).collect();
+            variance /= left;
+            predictors.push((Self { coefficients: a.clone(), variance: 1.0 }, variance));
+        }
+        predictors.reverse();
+        Some(predictors)
+    }
+
     /// Spectral density at a frequency, in shares of the sampling rate: the variance of the noise is
     /// its mean.
     pub(super) fn density(&self, frequency: f64) -> f64 {

@@ -1,22 +1,21 @@
 //! Covariance of the values of a fit by least squares whose residual is correlated.
 //!
 //! With the change J of the displacement with each value, the residual e and B = (J'J)^-1, the
-//! covariance is B M B n / (n - p), M = J' G J, in which G is the covariance of an autoregression
-//! that was fitted to the residual: Domowitz and White 1982, doi 10.1016/0304-4076(82)90012-3; Ljung
-//! 1999, System Identification, section 9.4.
+//! covariance is B M B, M = J' G J, in which G is the covariance of an autoregression of the noise by
+//! restricted likelihood: Domowitz and White 1982, doi 10.1016/0304-4076(82)90012-3; Ljung 1999,
+//! System Identification, section 9.4.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::autoregression::Autoregression;
 use super::fourier::transform;
-use super::linearised::{Linearised, Projected, ROUNDING, orthonormal, project, without};
+use super::inverse::Inverse;
+use super::linearised::{Linearised, Projected, orthonormal, project, without};
 use super::resampling::{Bins, studentised};
+use super::restricted::restricted;
 use crate::error::{Error, Result};
 use crate::math::on_all_threads;
 use crate::signal::index;
-
-/// Share of a value's direction without effect from which on it is not determined.
-const WITHOUT: f64 = 1e-6;
 
 /// Parts of the frequencies that are summed side by side.
 const PARTS: usize = 16;
@@ -69,7 +68,12 @@ pub fn covariance(
     let samples: usize = records.iter().map(|one| one.residual.len()).sum();
     let fitted = count + records.iter().map(|one| one.nuisance.len()).sum::<usize>();
     let freedom = index(samples - fitted);
-    let projected: Vec<Projected> = records.iter().map(project).collect();
+    let scale = index(samples) / freedom;
+    let left: Vec<Autoregression> =
+        records.iter().map(|one| Autoregression::of(&one.noise).scaled(scale)).collect();
+    let noises = restricted(records, precision, left.clone());
+    let projected: Vec<Projected> =
+        records.iter().zip(noises).map(|(one, noise)| project(one, noise)).collect();
     let variance =
         records.iter().map(|one| one.weight * squares(&one.residual)).sum::<f64>() / freedom;
     let noise = records.iter().map(|one| one.weight * squares(&one.noise)).sum::<f64>() / freedom;
@@ -82,17 +86,16 @@ pub fn covariance(
     }
     let inverse = Inverse::of(&square);
     let b = &inverse.matrix;
-    let scale = index(samples) / freedom;
     // A prior counts like deviations of its own.
     let mut matrix = b * (precision * (variance * variance)) * b;
     let mut bins = Vec::with_capacity(records.len());
     for one in &projected {
         let spectra = Spectra::of(one, b);
-        matrix += spectra.covariance(&one.sieve.noise) * (scale * one.weight * one.weight);
+        matrix += spectra.covariance(&one.sieve.noise) * (one.weight * one.weight);
         bins.push(spectra.bins());
     }
-    let bins = Bins::of(bins, &projected, &matrix, scale);
-    let resampled = studentised(&projected, &bins, b, scale, (draws, seed));
+    let bins = Bins::of(bins, &projected, &matrix);
+    let resampled = studentised(&projected, &bins, b, (&left, scale), (draws, seed));
     let shifts = shifts(records, &projected, precision, variance, &matrix);
     Ok(Covariance {
         independent: (0..count).map(|i| noise * b[(i, i)]).collect(),
@@ -131,46 +134,6 @@ fn check(records: &[Linearised], count: usize) -> Result<()> {
 
 fn squares(values: &[f64]) -> f64 {
     values.iter().map(|x| x * x).sum()
-}
-
-/// Inverse of normal equations, in the directions that have an effect.
-struct Inverse {
-    matrix: DMatrix<f64>,
-    determined: Vec<bool>,
-    hidden: Vec<Vec<f64>>,
-}
-
-impl Inverse {
-    fn of(square: &DMatrix<f64>) -> Self {
-        let count = square.nrows();
-        let sizes: Vec<f64> = (0..count).map(|i| square[(i, i)].max(0.0).sqrt()).collect();
-        let over = |i: usize, j: usize| {
-            let size = sizes[i] * sizes[j];
-            if size > 0.0 { square[(i, j)] / size } else { 0.0 }
-        };
-        let decomposed = DMatrix::from_fn(count, count, over).symmetric_eigen();
-        let (values, axes) = (&decomposed.eigenvalues, &decomposed.eigenvectors);
-        let seen: Vec<usize> = (0..count).filter(|&k| values[k] > ROUNDING).collect();
-        let part = |i: usize, j: usize| {
-            seen.iter().map(|&k| axes[(i, k)] * axes[(j, k)] / values[k]).sum::<f64>()
-        };
-        let matrix = DMatrix::from_fn(count, count, |i, j| {
-            let size = sizes[i] * sizes[j];
-            if size > 0.0 { part(i, j) / size } else { 0.0 }
-        });
-        let hidden = |i: usize| {
-            let length: f64 = seen.iter().map(|&k| axes[(i, k)] * axes[(i, k)]).sum();
-            1.0 - length > WITHOUT
-        };
-        let determined = (0..count).map(|i| sizes[i] > 0.0 && !hidden(i)).collect();
-        let direction = |k: usize| {
-            let change = |i: usize| axes[(i, k)] / if sizes[i] > 0.0 { sizes[i] } else { 1.0 };
-            let largest = (0..count).map(|i| change(i).abs()).fold(f64::MIN_POSITIVE, f64::max);
-            (0..count).map(|i| change(i) / largest).collect()
-        };
-        let unseen = (0..count).filter(|k| !seen.contains(k));
-        Self { matrix, determined, hidden: unseen.map(direction).collect() }
-    }
 }
 
 /// Spectra of what each value takes of a noise, J B.

@@ -2,6 +2,7 @@
 
 use nalgebra::DMatrix;
 
+use super::autoregression::Autoregression;
 use super::sieve::Sieve;
 
 /// Share of an eigenvalue below which its direction does not change the displacement.
@@ -32,13 +33,13 @@ pub(super) struct Projected {
     pub weight: f64,
 }
 
-/// Takes the part of what belongs to the record alone off its columns.
-pub(super) fn project(record: &Linearised) -> Projected {
+/// Takes the part of what belongs to the record alone off its columns; its noise is known.
+pub(super) fn project(record: &Linearised, noise: Autoregression) -> Projected {
     let n = record.residual.len();
     let of = |columns: &[Vec<f64>]| DMatrix::from_fn(n, columns.len(), |t, i| columns[i][t]);
     let nuisance = orthonormal(of(&record.nuisance));
     let columns = without(&nuisance, of(&record.columns));
-    Projected { columns, nuisance, sieve: Sieve::of(&record.noise), weight: record.weight }
+    Projected { columns, nuisance, sieve: Sieve::with(noise, &record.noise), weight: record.weight }
 }
 
 /// An orthonormal basis of columns, of those that are not a part of the others.

@@ -3,8 +3,10 @@
 mod autoregression;
 mod covariance;
 mod fourier;
+mod inverse;
 mod linearised;
 mod resampling;
+mod restricted;
 mod sieve;
 
 pub use autoregression::Autoregression;

@@ -23,11 +23,10 @@ impl Bins {
         records: Vec<Vec<(f64, Vec<f64>)>>,
         projected: &[Projected],
         matrix: &DMatrix<f64>,
-        scale: f64,
     ) -> Self {
         let mut bins = Self { records, corrections: vec![1.0; matrix.nrows()] };
         let noises: Vec<&Autoregression> = projected.iter().map(|one| &one.sieve.noise).collect();
-        let rough = bins.variances(&noises, projected, scale);
+        let rough = bins.variances(&noises, projected);
         let over =
             |(i, rough): (usize, f64)| if rough > 0.0 { matrix[(i, i)] / rough } else { 1.0 };
         bins.corrections = rough.into_iter().enumerate().map(over).collect();
@@ -35,10 +34,10 @@ impl Bins {
     }
 
     /// Variance of each value under noises.
-    fn variances(&self, noises: &[&Autoregression], records: &[Projected], scale: f64) -> Vec<f64> {
+    fn variances(&self, noises: &[&Autoregression], records: &[Projected]) -> Vec<f64> {
         let mut variances = vec![0.0; self.corrections.len()];
         for ((bins, noise), record) in self.records.iter().zip(noises).zip(records) {
-            let weight = scale * record.weight * record.weight;
+            let weight = record.weight * record.weight;
             for (frequency, powers) in bins {
                 let density = weight * noise.density(*frequency);
                 for (variance, power) in variances.iter_mut().zip(powers) {
@@ -50,19 +49,27 @@ impl Bins {
     }
 }
 
-/// Sizes of the deviations of each value over their own standard deviations, a row for each draw.
+/// Sizes of the deviations of each value over its standard deviation, a row for each draw.
+///
+/// The deviation of a draw is that of an autoregression of what its fit leaves, its variance times
+/// `scale`; `left` are those of the records.
 pub(super) fn studentised(
     records: &[Projected],
     bins: &Bins,
     b: &DMatrix<f64>,
-    scale: f64,
+    (left, scale): (&[Autoregression], f64),
     (draws, seed): (u32, u64),
 ) -> Vec<Vec<f64>> {
+    let known: Vec<&Autoregression> = records.iter().map(|one| &one.sieve.noise).collect();
+    let left: Vec<&Autoregression> = left.iter().collect();
+    let (known, left) = (bins.variances(&known, records), bins.variances(&left, records));
     let draws: Vec<u32> = (0..draws).collect();
     on_all_threads(&draws, &|&draw| {
         let mut stream = Draws::at(seed, u64::from(draw), 0, 0, 1);
-        let noises: Vec<DVector<f64>> =
-            records.iter().map(|one| resampled(one, scale, &mut stream)).collect();
+        let noises: Vec<DVector<f64>> = records
+            .iter()
+            .map(|one| DVector::from_vec(one.sieve.drawn(one.columns.nrows(), 1.0, &mut stream)))
+            .collect();
         let mut slope = DVector::zeros(b.nrows());
         for (one, noise) in records.iter().zip(&noises) {
             slope += one.columns.tr_mul(noise) * one.weight;
@@ -77,19 +84,15 @@ pub(super) fn studentised(
                     let parts = one.nuisance.tr_mul(&left);
                     left -= &one.nuisance * parts;
                 }
-                Autoregression::of(left.as_slice())
+                Autoregression::of(left.as_slice()).scaled(scale)
             })
             .collect();
         let refitted: Vec<&Autoregression> = refitted.iter().collect();
-        let variances = bins.variances(&refitted, records, scale);
-        let over = |(moved, variance): (&f64, f64)| {
-            if variance > 0.0 { moved.abs() / variance.sqrt() } else { 0.0 }
+        let variances = bins.variances(&refitted, records);
+        let over = |i: usize| {
+            let variance = variances[i] * known[i] / left[i];
+            if variance > 0.0 { moved[i].abs() / variance.sqrt() } else { 0.0 }
         };
-        moved.iter().zip(variances).map(over).collect()
+        (0..moved.len()).map(over).collect()
     })
-}
-
-/// A noise from innovations drawn with replacement.
-fn resampled(record: &Projected, scale: f64, stream: &mut Draws) -> DVector<f64> {
-    DVector::from_vec(record.sieve.drawn(record.columns.nrows(), scale, stream))
 }

@@ -17,11 +17,18 @@ pub(in crate::identify) struct Sieve {
 
 impl Sieve {
     pub fn of(noise: &[f64]) -> Self {
-        let fitted = Autoregression::of(noise);
+        Self::with(Autoregression::of(noise), noise)
+    }
+
+    /// With an autoregression that is known, whose variance the innovations have.
+    pub fn with(fitted: Autoregression, noise: &[f64]) -> Self {
         let mut innovations = fitted.innovations(noise);
-        let mean = innovations.iter().sum::<f64>() / index(innovations.len().max(1));
+        let count = index(innovations.len().max(1));
+        let mean = innovations.iter().sum::<f64>() / count;
+        let power = innovations.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
+        let size = if power > 0.0 { (fitted.variance / power).sqrt() } else { 1.0 };
         for value in &mut innovations {
-            *value -= mean;
+            *value = size * (*value - mean);
         }
         Self { noise: fitted, innovations }
     }
