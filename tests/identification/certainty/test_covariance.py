@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 import piezotrack as pt
@@ -199,26 +199,29 @@ def test_the_noise_is_that_of_the_largest_restricted_likelihood() -> None:
     noise = lfilter([1.0], [1.0, -pole], rng.standard_normal(n + 500))[500:]
     left = np.linalg.svd(fitted)[0][:, fitted.shape[1] :]
     residual = left @ (left.T @ noise)
-
-    def correlations(first: float) -> np.ndarray:
-        return np.asarray(toeplitz(first ** np.arange(n)) / (1.0 - first**2))
-
-    def cost(first: float) -> float:
-        square = left.T @ correlations(first) @ left
-        variance = residual @ left @ np.linalg.solve(square, left.T @ residual)
-        return float((n - 3) * np.log(variance) + np.linalg.slogdet(square)[1])
-
-    first = float(minimize_scalar(cost, bounds=(0.5, 0.999), method="bounded").x)
-    square = left.T @ correlations(first) @ left
-    variance = residual @ left @ np.linalg.solve(square, left.T @ residual) / (n - 3)
-    take = np.linalg.pinv(fitted)[:2]
-    expected = variance * take @ correlations(first) @ take.T
     record = (columns, [np.ones(n)], residual, residual, 1.0)
-    matrix, *_, orders, _ = _core.linearised_covariance([record], np.zeros((2, 2)).tolist(), 0, 0)
-    assert orders == [1]
+    matrix, *_, (order,), _ = _core.linearised_covariance([record], np.zeros((2, 2)).tolist(), 0, 0)
+
+    def correlations(coefficients: np.ndarray) -> np.ndarray:
+        answer = lfilter([1.0], [1.0, *-coefficients], np.eye(1, 20 * n)[0])
+        return np.asarray(toeplitz([answer[k:] @ answer[: answer.size - k] for k in range(n)]))
+
+    def cost(coefficients: np.ndarray) -> float:
+        roots = np.roots([1.0, *-coefficients])
+        if np.abs(roots).max() > 0.999:
+            return float("inf")
+        square = left.T @ correlations(coefficients) @ left
+        power = residual @ left @ np.linalg.solve(square, left.T @ residual)
+        return float((n - 3) * np.log(power) + np.linalg.slogdet(square)[1])
+
+    begun = np.array([0.9, *np.zeros(order - 1)])
+    likeliest = minimize(cost, begun, method="Nelder-Mead", options={"xatol": 1e-4}).x
+    square = left.T @ correlations(likeliest) @ left
+    power = residual @ left @ np.linalg.solve(square, left.T @ residual) / (n - 3)
+    take = np.linalg.pinv(fitted)[:2]
+    expected = power * take @ correlations(likeliest) @ take.T
     assert np.array(matrix) == pytest.approx(expected, rel=0.02)
-    # Of the residual alone it has less slow noise.
-    (alone,), power = _core.autoregression(residual)
-    assert alone < first - 0.01
-    least = power * take @ correlations(alone) @ take.T
+    # An autoregression of the residual alone has less slow noise.
+    alone, power = _core.autoregression(residual)
+    least = power * take @ correlations(np.array(alone)) @ take.T
     assert np.all(np.diag(least) < 0.8 * np.diag(expected))

@@ -21,17 +21,42 @@ pub struct Autoregression {
 }
 
 impl Autoregression {
-    /// Fits one to a noise, of the order that the criterion of Akaike chooses: Burg's method (Burg
-    /// 1968; Kay 1988, Modern Spectral Estimation, section 7.6), Akaike 1974, doi
-    /// 10.1109/TAC.1974.1100705.
+    /// Fits one to a noise, of the order that the criterion of Akaike chooses (1974, doi
+    /// 10.1109/TAC.1974.1100705).
     #[must_use]
     pub fn of(noise: &[f64]) -> Self {
+        Self::likeliest(Self::of_all_orders(noise), noise.len())
+    }
+
+    /// The same, and of an order half as high again: that of Akaike is for predictions, and short of
+    /// what is slow and small beside other noise.
+    pub(super) fn pair_of(noise: &[f64]) -> [Self; 2] {
+        let all = Self::of_all_orders(noise);
+        let chosen = Self::likeliest(all.clone(), noise.len());
+        let higher = (chosen.order() + chosen.order().div_ceil(2)).min(all.len() - 1);
+        let longer = all.into_iter().nth(higher).unwrap_or_else(|| chosen.clone());
+        [chosen, longer]
+    }
+
+    /// The one of least criterion, the lowest order first.
+    fn likeliest(all: Vec<Self>, samples: usize) -> Self {
+        let criterion = |one: &Self| {
+            let power = one.variance.max(f64::MIN_POSITIVE);
+            index(samples) * libm::log(power) + 2.0 * index(one.order())
+        };
+        let better =
+            |best: Self, one: Self| if criterion(&one) < criterion(&best) { one } else { best };
+        all.into_iter().reduce(better).unwrap_or(Self { coefficients: vec![], variance: 0.0 })
+    }
+
+    /// Those of orders 0 and above, by Burg's method (Burg 1968; Kay 1988, Modern Spectral Estimation,
+    /// section 7.6).
+    fn of_all_orders(noise: &[f64]) -> Vec<Self> {
         let count = noise.len();
         let mut power = noise.iter().map(|x| x * x).sum::<f64>() / index(count.max(1));
         let (mut forward, mut backward) = (noise.to_vec(), noise.to_vec());
         let mut a: Vec<f64> = Vec::new();
-        let mut best = Self { coefficients: Vec::new(), variance: power };
-        let mut least = index(count) * libm::log(power.max(f64::MIN_POSITIVE));
+        let mut all = vec![Self { coefficients: Vec::new(), variance: power }];
         for order in 1..=HIGHEST.min(count / EACH) {
             let (mut product, mut squares) = (0.0, 0.0);
             for t in order..count {
@@ -54,14 +79,9 @@ impl Autoregression {
                 backward[t] = b - reflection * f;
             }
             power *= 1.0 - reflection * reflection;
-            let criterion =
-                index(count) * libm::log(power.max(f64::MIN_POSITIVE)) + 2.0 * index(order);
-            if criterion < least {
-                least = criterion;
-                best = Self { coefficients: a.clone(), variance: power };
-            }
+            all.push(Self { coefficients: a.clone(), variance: power });
         }
-        best
+        all
     }
 
     /// The same, its variance times a factor.

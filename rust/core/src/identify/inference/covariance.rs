@@ -69,9 +69,12 @@ pub fn covariance(
     let fitted = count + records.iter().map(|one| one.nuisance.len()).sum::<usize>();
     let freedom = index(samples - fitted);
     let scale = index(samples) / freedom;
-    let left: Vec<Autoregression> =
-        records.iter().map(|one| Autoregression::of(&one.noise).scaled(scale)).collect();
-    let noises = restricted(records, precision, left.clone());
+    let pair = |one: &Linearised| {
+        let [left, longer] = Autoregression::pair_of(&one.noise);
+        (left.scaled(scale), longer.scaled(scale))
+    };
+    let (left, longer): (Vec<_>, Vec<_>) = records.iter().map(pair).unzip();
+    let noises = restricted(records, precision, longer);
     let projected: Vec<Projected> =
         records.iter().zip(noises).map(|(one, noise)| project(one, noise)).collect();
     let variance =
