@@ -119,6 +119,12 @@ impl Autoregression {
         Some(predictors)
     }
 
+    /// Variance of its noise; `None` where it grows.
+    pub(super) fn power(&self) -> Option<f64> {
+        let first = self.first()?;
+        Some(self.variance * first.first().map_or(1.0, |(_, variance)| *variance))
+    }
+
     /// Spectral density at a frequency, in shares of the sampling rate: the variance of the noise is
     /// its mean.
     pub(super) fn density(&self, frequency: f64) -> f64 {

@@ -18,6 +18,13 @@ use crate::signal::index;
 const ROUNDS: usize = 100;
 const SETTLED: f64 = 1e-5;
 
+/// Variance of a noise over that of what the fit has left of it, at most: where a record does not show
+/// how slow the noise is, its likelihood grows towards a drift without end.
+const MOST_TAKEN: f64 = 4.0;
+
+/// Halvings of a range of factors of the poles.
+const HALVINGS: usize = 30;
+
 /// Steps of a round at most, the least part of one, and the least gain of the logarithm of the
 /// likelihood, twice.
 const STEPS: usize = 20;
@@ -109,6 +116,8 @@ struct Products {
     /// The samples before these.
     first: DMatrix<f64>,
     samples: usize,
+    /// Mean square of the noise that the fit has left.
+    left: f64,
 }
 
 impl Products {
@@ -132,7 +141,8 @@ impl Products {
             forward.push(next);
         }
         let lagged = forward.iter().flatten().map(|one| (one + one.transpose()) * 0.5).collect();
-        Self { lagged, first: z.rows(0, order).into_owned(), samples }
+        let left = record.noise.iter().map(|x| x * x).sum::<f64>() / index(samples);
+        Self { lagged, first: z.rows(0, order).into_owned(), samples, left }
     }
 
     /// Products of the innovations that an autoregression makes of the columns, over their variance.
@@ -169,8 +179,32 @@ impl Products {
             first: &self.first * expected * self.first.transpose(),
             samples: index(self.samples),
         };
-        likelihood.best(than)
+        let best = likelihood.best(than)?;
+        Some(limited(best, MOST_TAKEN * self.left))
     }
+}
+
+/// An autoregression, its poles moved in until its noise has a variance of `most`, if it has more.
+fn limited(noise: Autoregression, most: f64) -> Autoregression {
+    let moved = |factor: f64| {
+        let mut power = 1.0;
+        let mut other = noise.clone();
+        for a in &mut other.coefficients {
+            power *= factor;
+            *a *= power;
+        }
+        other
+    };
+    let is_within = |one: &Autoregression| one.power().is_some_and(|power| power <= most);
+    if is_within(&noise) {
+        return noise;
+    }
+    let (mut within, mut beyond) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (within + beyond);
+        if is_within(&moved(middle)) { within = middle } else { beyond = middle }
+    }
+    moved(within)
 }
 
 /// Expected likelihood of an autoregression.
@@ -250,7 +284,7 @@ mod tests {
 
     use nalgebra::{DMatrix, DVector};
 
-    use super::{Autoregression, Linearised, restricted};
+    use super::{Autoregression, Linearised, limited, restricted};
     use crate::math::Draws;
     use crate::signal::index;
 
@@ -269,6 +303,14 @@ mod tests {
         let residual: Vec<f64> = (noise - z * taken).iter().copied().collect();
         let noise = residual.clone();
         Some(Linearised { columns, nuisance: vec![], residual, noise, weight: 1.0 })
+    }
+
+    #[test]
+    fn a_noise_without_end_is_held_where_its_variance_is_the_largest() {
+        let endless = Autoregression { coefficients: vec![1.2, -0.2], variance: 1.0 };
+        assert_eq!(endless.power(), None);
+        let held = limited(endless, 40.0);
+        assert!(held.power().is_some_and(|power| (39.9..=40.0).contains(&power)));
     }
 
     #[test]
