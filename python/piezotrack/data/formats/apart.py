@@ -250,7 +250,8 @@ def _answer(request: Request, tables: dict[int, ChannelTable]) -> tuple[dict[str
         _limit_memory(MARGIN + 4 * source.most)
         # Opened again where another file was opened since.
         if (number := request.get("table", time.monotonic_ns())) not in tables:
-            version = [getattr(source.path.stat(), f"st_{what}") for what in ("mtime_ns", "size")]
+            stat = source.path.stat()
+            version = [stat.st_mtime_ns, stat.st_size]
             if request.get("version", version) != version:
                 raise source.error("has changed while it was read: expected the same file")
             tables.clear()
