@@ -79,6 +79,19 @@ def test_a_lightly_damped_mode_that_the_record_shows_is_found(kind: str) -> None
         assert not fit.at_bound
 
 
+@pytest.mark.parametrize("frequency", [560.0, 820.0])
+def test_a_mode_above_half_the_sampling_rate_is_found(frequency: float) -> None:
+    # The straight ramps between samples tell it from the slower mode that rings alike at them.
+    fine = 20
+    u = shaken("steps")
+    between = np.interp(np.arange(fine * (u.size - 1) + 1) / fine, np.arange(u.size), u)
+    stage = replace(PLAIN, frequency=frequency, damping_ratio=0.03)
+    y = noisy(stage.simulate(between, DT / fine).x[::fine])
+    fit = fitted(u, y, dynamics="auto", history="virgin", start=200)
+    assert number(fit, "frequency") == pytest.approx(frequency, rel=0.01)
+    assert fit.rms < 12e-9
+
+
 def test_two_modes_are_found() -> None:
     stage = replace(
         MODE, mode_weights=(0.2,), mode_frequencies=(60.0,), mode_damping_ratios=(0.05,)

@@ -92,6 +92,7 @@ pub(super) const MODE_GAIN: f64 = 0.02;
 
 /// Shares of the deviation that a history, creep, a drift and a lag have to take away.
 pub(super) const HISTORY_GAIN: f64 = 0.02;
+pub(super) const EARLIER_DRIVE_GAIN: f64 = 0.2;
 pub(super) const CREEP_GAIN: f64 = 0.015;
 pub(super) const DRIFT_GAIN: f64 = 0.015;
 pub(super) const LAG_GAIN: f64 = 0.01;

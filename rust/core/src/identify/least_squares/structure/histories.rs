@@ -1,12 +1,23 @@
 //! Histories of a record: the fit with another one, and the voltage that the stage came from.
 
-use crate::identify::least_squares::settings::{FIRST_SHARE, ROUGH, STEPS};
+use crate::identify::least_squares::settings::{
+    EARLIER_DRIVE_GAIN, FIRST_SHARE, HISTORY_GAIN, ROUGH, STEPS,
+};
 use crate::identify::least_squares::solving::fit::{Beginning, Fit};
 use crate::identify::records::history::History;
 use crate::signal::{index, range};
 
 /// Steps of a trial among many: the best one is settled.
 const FEW_STEPS: usize = 2;
+
+/// Share of the deviation that a history has to take away beside that of a stage which never moved.
+pub(super) fn history_gain(history: History) -> f64 {
+    match history {
+        History::Virgin => 0.0,
+        History::Settled => HISTORY_GAIN,
+        History::Fitted => EARLIER_DRIVE_GAIN,
+    }
+}
 
 /// The fit with another history of record `r`, as good as it gets.
 pub(super) fn with_history<'a>(

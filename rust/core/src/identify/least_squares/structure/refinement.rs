@@ -7,13 +7,13 @@
 //! take away: residuals of models are correlated, so that criteria that count independent samples,
 //! as Akaike's, would take every part.
 
-use super::histories::{fitted_history, nearer, with_history};
+use super::histories::{fitted_history, history_gain, nearer, with_history};
 use super::lag::{best_lag, lag_gain};
 use super::slow_parts::{creeps, with_drift};
 use super::trials::{Trial, settled_all, with_each};
 use crate::identify::least_squares::settings::{
-    CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, HISTORY_GAIN,
-    LAG_BESIDE_CREEP_GAIN, MODE_GAIN, ROUGH, Settings, UNSEEN_GAIN,
+    CREEP_GAIN, CreepKind, DRIFT_GAIN, DynamicsKind, FIRST_SHARE, LAG_BESIDE_CREEP_GAIN, MODE_GAIN,
+    ROUGH, Settings, UNSEEN_GAIN,
 };
 use crate::identify::least_squares::solving::fit::Fit;
 use crate::identify::least_squares::solving::form::Form;
@@ -61,11 +61,7 @@ impl Refinement<'_> {
         for (r, record) in fit.common.records.iter().enumerate() {
             // Each history with more freedom has to take its share away.
             if record.history.is_none() {
-                cost += match fit.begins[r].history {
-                    History::Virgin => 0.0,
-                    History::Settled => HISTORY_GAIN,
-                    History::Fitted => 2.0 * HISTORY_GAIN,
-                };
+                cost += history_gain(fit.begins[r].history);
             }
             if record.drift == DriftKind::Auto && fit.drifts[r].is_some() {
                 cost += DRIFT_GAIN;

@@ -2,7 +2,7 @@
 //!
 //! Each is decided in turn on the least squares so far, and has to earn its place.
 
-use super::histories::{fitted_history, with_history};
+use super::histories::{fitted_history, history_gain, with_history};
 use super::lag::{best_lag, relaxes_as_well, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::nodes::{add_once, choose_nodes, few_or_many, spread};
@@ -59,13 +59,12 @@ pub(in crate::identify::least_squares) fn search<'a>(
     let chosen = choose(&few, settings)?;
     common.count(few.evaluations());
     let mut fit = chosen.on(common);
-    if settings.start.as_ref().is_some_and(|start| !start.kept) {
-        fit.settle(ROUGH)?;
-    } else {
+    let kept = settings.start.as_ref().is_none_or(|start| start.kept);
+    if kept {
         fit.settle(1e-4)?;
-        fit.exact = true;
-        fit.settle(1e-8)?;
     }
+    fit.exact = true;
+    fit.settle(if kept { 1e-8 } else { ROUGH })?;
     drop_modes(&mut fit)?;
     Some(fit)
 }
@@ -86,13 +85,15 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     let every = |one: &WeightsRecord<'_>| one.samples().div_ceil(rows_of(common));
     fit.every = common.records.iter().map(every).collect();
     fit.settle(ROUGH)?;
-    search_shape(&mut fit)?;
-    place_corners(&mut fit, settings.zones);
-    fit.settle(ROUGH)?;
     if let Some(start) = &settings.start {
         return resumed(fit, settings, start);
     }
+    bend(&mut fit, settings)?;
     let mode = first_mode(&mut fit, settings)?;
+    if mode {
+        // What rings hides the shape.
+        bend(&mut fit, settings)?;
+    }
     if let CreepKind::Times(times) = &settings.creep {
         fit.restructure(|fit| fit.times.clone_from(times));
         fit.settle(ROUGH)?;
@@ -100,7 +101,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     let refinement = Refinement { settings, shown: mode };
     let mut starts = vec![None];
     if fit.common.records.len() == 1 && fit.common.records[0].history.is_none() {
-        starts.extend([History::Virgin, History::Settled, History::Fitted].map(Some));
+        starts = [History::Virgin, History::Settled, History::Fitted].map(Some).to_vec();
     }
     let begun = with_each(&starts, |history| with_slow_and_late(&fit, settings, mode, *history))?;
     let mut begun = distinct(begun);
@@ -177,6 +178,7 @@ fn resumed<'a>(mut fit: Fit<'a>, settings: &Settings, start: &Structure) -> Opti
     }
     fit.set_poles(form, &poles);
     fit.settle(ROUGH)?;
+    bend(&mut fit, settings)?;
     for r in 0..fit.begins.len() {
         if fit.begins[r].history == History::Fitted {
             fit = fitted_history(&fit, r)?;
@@ -199,26 +201,26 @@ fn with_slow_and_late<'a>(
     history: Option<History>,
 ) -> Option<Fit<'a>> {
     let mut fit = from.clone();
-    match history {
-        Some(History::Fitted) => fit = fitted_history(&fit, 0)?,
-        Some(history) => fit = with_history(&fit, 0, (history, 0.0), STEPS)?,
-        None => {
-            // With a lag, or what it does would be taken for a history.
-            let lags =
-                matches!(settings.dynamics, DynamicsKind::First | DynamicsKind::Auto) && !mode;
-            if lags {
-                fit = best_lag(&fit)?;
-            }
-            choose_histories(&mut fit, settings)?;
-            if lags {
-                fit.set_poles(Form::None, &[]);
-                fit.settle(ROUGH)?;
-            }
-        }
+    // With a lag, or what it does would be taken for a history.
+    let lags = matches!(settings.dynamics, DynamicsKind::First | DynamicsKind::Auto) && !mode;
+    if lags {
+        fit = best_lag(&fit)?;
+    }
+    choose_histories(&mut fit, settings, history)?;
+    if lags {
+        fit.set_poles(Form::None, &[]);
+        fit.settle(ROUGH)?;
     }
     choose_slow(&mut fit, settings)?;
     choose_dynamics_and_creep(&mut fit, settings, mode)?;
     Some(fit)
+}
+
+/// The shape of the envelopes, and dead zones, anew.
+fn bend(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+    search_shape(fit)?;
+    place_corners(fit, settings.zones);
+    fit.settle(ROUGH)
 }
 
 /// Spreads the dead zones over what comes out of the plays in the windows.
@@ -288,9 +290,9 @@ fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
     Some(())
 }
 
-/// The histories that were set, or the simplest ones that explain the records.
-fn choose_histories(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
-    let open = fit.common.records.iter().any(|one| one.history.is_none());
+/// The histories that were set, or one that is held, or the simplest ones that explain the records.
+fn choose_histories(fit: &mut Fit<'_>, settings: &Settings, held: Option<History>) -> Option<()> {
+    let open = held.is_none() && fit.common.records.iter().any(|one| one.history.is_none());
     if open && settings.creep == CreepKind::Auto {
         // With creep, or what it does would be taken for a history.
         let times = creeps(fit).pop().unwrap_or_default();
@@ -298,44 +300,34 @@ fn choose_histories(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
         fit.settle(ROUGH)?;
     }
     for r in 0..fit.common.records.len() {
-        choose_history(fit, settings, r)?;
+        match fit.common.records[r].history.or(held) {
+            Some(history) => *fit = begun(fit, settings, r, history)?,
+            None => choose_history(fit, settings, r)?,
+        }
     }
     Some(())
 }
 
-/// The history of one record.
-fn choose_history(fit: &mut Fit<'_>, settings: &Settings, r: usize) -> Option<()> {
-    let with_once = |fit: &mut Fit<'_>| {
-        if settings.nodes == NodesKind::Auto { add_once(fit, HISTORY_GAIN) } else { Some(()) }
+/// The fit with a history of one record, and with the play that moves once where that explains it.
+fn begun<'a>(fit: &Fit<'a>, settings: &Settings, r: usize, history: History) -> Option<Fit<'a>> {
+    let mut begun = match history {
+        History::Fitted => fitted_history(fit, r)?,
+        _ if fit.begins[r].history == history => fit.clone(),
+        _ => with_history(fit, r, (history, 0.0), STEPS)?,
     };
-    match fit.common.records[r].history {
-        Some(History::Settled) => {}
-        Some(History::Virgin) => with_once(fit)?,
-        Some(History::Fitted) => {
-            *fit = fitted_history(fit, r)?;
-            with_once(fit)?;
-        }
-        None => {
-            let [virgin, fitted, settled] = side_by_side([
-                &|| {
-                    let mut virgin = fit.clone();
-                    with_once(&mut virgin)?;
-                    Some(virgin)
-                },
-                &|| {
-                    let mut fitted = fitted_history(fit, r)?;
-                    with_once(&mut fitted)?;
-                    Some(fitted)
-                },
-                &|| with_history(fit, r, (History::Settled, 0.0), STEPS),
-            ])?;
-            let other = if virgin.rms < fitted.rms { virgin } else { fitted };
-            for trial in [settled, other] {
-                let enough = (1.0 - HISTORY_GAIN) * fit.deviation_of(r);
-                if trial.rms < fit.rms && trial.deviation_of(r) < enough {
-                    *fit = trial;
-                }
-            }
+    if history != History::Settled && settings.nodes == NodesKind::Auto {
+        add_once(&mut begun, HISTORY_GAIN)?;
+    }
+    Some(begun)
+}
+
+/// The history of one record: more freedom has to explain more.
+fn choose_history(fit: &mut Fit<'_>, settings: &Settings, r: usize) -> Option<()> {
+    let tried = [History::Virgin, History::Settled, History::Fitted];
+    for trial in with_each(&tried, |history| begun(fit, settings, r, *history))? {
+        let gain = f64::max(HISTORY_GAIN, history_gain(trial.begins[r].history));
+        if trial.rms < fit.rms && trial.deviation_of(r) < (1.0 - gain) * fit.deviation_of(r) {
+            *fit = trial;
         }
     }
     Some(())
