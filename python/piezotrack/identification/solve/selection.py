@@ -70,7 +70,8 @@ APART, CORRELATED, CHANCE = 10, 0.1, 4.0
 # has one loop, on which all are judged that were fitted to it, by more.
 BETTER, BETTER_ON_ONE_LOOP = 0.03, 0.1
 # One that leaves more than noise on the whole record gives way to one of so many others, the best
-# on what was not fitted, that leaves less by this share there; not to one of many weights.
+# on what was not fitted, that leaves less by this share there; or to one of many weights, which a
+# drive that repeats does not determine.
 OTHERS, BETTER_ON_WHOLE, MANY_WEIGHTS = 3, 0.25, "preisach"
 # Blocks of the drive that differ by this ratio in amplitude or rate are judged apart.
 APART_IN_SIZE = 2.0
@@ -206,7 +207,10 @@ class _Trials:
             for one in sorted(self.found, key=lambda one: one.trial.rms)
             if one is not best and one.start is not None and (best.ill or not one.ill)
         ]
-        return [one for one in others if one.info.name != MANY_WEIGHTS][:OTHERS]
+        few = [one for one in others if one.info.name != MANY_WEIGHTS][:OTHERS]
+        if any(period_of(record.data) for record in self.problem.records):
+            return few
+        return [*few, *(one for one in others if one.info.name == MANY_WEIGHTS)]
 
     def run(self, info: ModelInfo) -> bool:
         """Try a model; return whether it leaves nothing but noise."""

@@ -48,7 +48,7 @@ pub(super) fn few_or_many(common: &Common<'_>) -> usize {
 ///
 /// Where the stage goes beyond where it was before, plays of half of the range and more move once
 /// and never back: with `once` one further threshold stands for all of them.
-/// Levels divide all of the range that the drives reach.
+/// Levels divide all of the range that the drives reach, with `once` one stands beyond it.
 pub(super) fn spread(common: &Common<'_>, (count, power): (usize, f64), once: bool) -> Vec<f64> {
     match common.of.nodes() {
         Nodes::None => Vec::new(),
@@ -58,27 +58,57 @@ pub(super) fn spread(common: &Common<'_>, (count, power): (usize, f64), once: bo
         }
         Nodes::Levels => {
             let (low, high) = common.reached();
-            (0..=count).map(|i| low + (high - low) * index(i) / index(count)).collect()
+            let mut levels: Vec<f64> =
+                (0..=count).map(|i| low + (high - low) * index(i) / index(count)).collect();
+            levels.extend(beyond(common).filter(|_| once));
+            levels.sort_by(f64::total_cmp);
+            levels
         }
     }
 }
 
-/// Whether one of the plays moves once and never back.
-fn has_once(fit: &Fit<'_>) -> bool {
-    let plays = fit.common.of.nodes() == Nodes::Thresholds;
-    plays && fit.nodes.last().is_some_and(|last| *last >= reach(fit.common))
+/// The level as far from 0 V as the drives reach to the other side, where they do not reach it:
+/// relays that switch once and never back lie between the two.
+fn beyond(common: &Common<'_>) -> Option<f64> {
+    let (low, high) = common.reached();
+    let least = (high - low) / index(TRIED_LEVELS[0].0);
+    if high + low > least {
+        Some(-high)
+    } else if high + low < -least {
+        Some(-low)
+    } else {
+        None
+    }
 }
 
-/// Adds the play that moves once where it explains more than a share `gain` of the deviation: less
-/// would give it a weight by chance.
-pub(super) fn add_once(fit: &mut Fit<'_>, gain: f64) -> Option<()> {
-    if fit.common.of.nodes() != Nodes::Thresholds {
-        return Some(());
+/// Whether some of the plays or relays move once and never back.
+fn has_once(fit: &Fit<'_>) -> bool {
+    let (Some(first), Some(last)) = (fit.nodes.first(), fit.nodes.last()) else { return false };
+    match fit.common.of.nodes() {
+        Nodes::None => false,
+        Nodes::Thresholds => *last >= reach(fit.common),
+        Nodes::Levels => {
+            let (low, high) = fit.common.reached();
+            *first < low || *last > high
+        }
     }
-    let mut trial = fit.clone();
-    let kept = fit.x[fit.layout().weights()].to_vec();
-    trial.restructure(|trial| trial.nodes.push(reach(trial.common)));
-    trial.x[..kept.len()].copy_from_slice(&kept);
+}
+
+/// Adds the plays or relays that move once where they explain more than a share `gain` of the
+/// deviation: less would give them a weight by chance.
+pub(super) fn add_once(fit: &mut Fit<'_>, gain: f64) -> Option<()> {
+    let (common, mut trial) = (fit.common, fit.clone());
+    match common.of.nodes() {
+        Nodes::Thresholds => {
+            let kept = fit.x[fit.layout().weights()].to_vec();
+            trial.restructure(|trial| trial.nodes.push(reach(common)));
+            trial.x[..kept.len()].copy_from_slice(&kept);
+        }
+        Nodes::Levels if beyond(common).is_some() => {
+            trial.restructure(|trial| trial.nodes = spread(common, (LEVELS, 1.0), true));
+        }
+        Nodes::Levels | Nodes::None => return Some(()),
+    }
     trial.settle(ROUGH)?;
     if trial.rms < (1.0 - gain) * fit.rms {
         *fit = trial;

@@ -180,9 +180,8 @@ fn resumed<'a>(mut fit: Fit<'a>, settings: &Settings, start: &Structure) -> Opti
     fit.settle(ROUGH)?;
     bend(&mut fit, settings)?;
     for r in 0..fit.begins.len() {
-        if fit.begins[r].history == History::Fitted {
-            fit = fitted_history(&fit, r)?;
-        }
+        let history = fit.begins[r].history;
+        fit = begun(&fit, settings, r, history)?;
     }
     let refinement = Refinement { settings, shown: matches!(form, Form::Modes(_)) };
     refinement.refine(&mut fit, ROUNDS)?;
