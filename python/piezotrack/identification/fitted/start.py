@@ -47,8 +47,6 @@ History = Literal["virgin", "settled", "fit", "rest"]
 
 # A history with more freedom has to lower the rms of the residual by this share.
 GAIN = 0.02
-# In a fit, that of a voltage which is fitted by this one: it takes up what a model lacks, too.
-GAIN_OF_VOLTAGE = 0.2
 # Where the virgin and the settled stage differ by less than this share of the residual, the record
 # does not show its history.
 SHOWS = 0.1

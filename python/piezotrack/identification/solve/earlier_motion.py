@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...errors import DataError
-from ..fitted.start import GAIN, GAIN_OF_VOLTAGE
+from ..fitted.start import GAIN
 from ..methods.particle_swarm import ParticleSwarm
 from ..problem.objective import Objective
 
@@ -48,11 +48,6 @@ class EarlierMotion(NamedTuple):
 
     history: History
     share: float
-
-    @property
-    def gain(self) -> float:
-        """Share of the cost that it has to take away."""
-        return GAIN_OF_VOLTAGE if self.history == "fit" else GAIN
 
 
 def refined_cost(problem: Problem, fit: Identification, threads: int) -> float:
@@ -124,8 +119,8 @@ def earlier_motion(
     settled, before = (
         EarlierMotion(name, _lowest(one, fit) / cost) for name, one in objectives.items()
     )
-    gaining = [before] if before.share < (1.0 - before.gain) * settled.share else [settled, before]
-    return [one for one in gaining if one.share < 1.0 - one.gain]
+    gaining = [before] if before.share < (1.0 - GAIN) * settled.share else [settled, before]
+    return [one for one in gaining if one.share < 1.0 - GAIN]
 
 
 def _lowest(objective: Objective, fit: Identification) -> float:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ..._support.display.progress_bar import ProgressBar
 from ..._support.display.progress_parts import Parts
 from ...errors import Interrupted
+from ..fitted.start import GAIN
 from ..methods.least_squares import LeastSquares
 from ..methods.particle_swarm import ParticleSwarm
 from .earlier_motion import earlier_motion, refined_cost
@@ -128,12 +129,11 @@ def _with_history_shown(problem: Problem, method: Search, run: Run) -> Identific
     # A part of the record may show a drift where the whole of it does not.
     shown = record if fit.drift else replace(record, drift=False)
     for other in earlier_motion(replace(problem, records=(shown,)), virgin, alone, run.threads):
-        enough = (1.0 - other.gain) * least
-        if other.share * alone < enough:
+        if other.share * alone < (1.0 - GAIN) * least:
             with parts.begin(1):
                 other_fit = search_parameters(
                     with_history(other.history), method, run, virgin if swarms else None
                 )
-            if other_fit.cost < enough:
+            if other_fit.cost < (1.0 - GAIN) * least:
                 fit, least = other_fit, other_fit.cost
     return fit

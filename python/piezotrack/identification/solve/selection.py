@@ -71,7 +71,7 @@ APART, CORRELATED, CHANCE = 10, 0.1, 4.0
 BETTER, BETTER_ON_ONE_LOOP = 0.03, 0.1
 # One that leaves more than noise on the whole record gives way to one of so many others, the best
 # on what was not fitted, that leaves less by this share there; or to one of many weights, which a
-# drive that repeats does not determine.
+# drive that repeats does not determine. One of many weights has to leave less than others by it.
 OTHERS, BETTER_ON_WHOLE, MANY_WEIGHTS = 3, 0.25, "preisach"
 # Blocks of the drive that differ by this ratio in amplitude or rate are judged apart.
 APART_IN_SIZE = 2.0
@@ -149,9 +149,12 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
 
     with shares.begin(len(infos)):
         fit = whole(best)
-        if fit.cost > NEAR_NOISE * max(noise_of(record.data) for record in problem.records):
+        noise = max(noise_of(record.data) for record in problem.records)
+        if best.info.name == MANY_WEIGHTS or fit.cost > NEAR_NOISE * noise:
             # The first part does not show all that the whole record does.
             least = (1.0 - BETTER_ON_WHOLE) * fit.cost
+            if best.info.name == MANY_WEIGHTS:
+                least = fit.cost / (1.0 - BETTER_ON_WHOLE)
             for one in trials.others(best):
                 with suppress(DataError, NumericalError):
                     if begun(one, one.start).cost < least and (other := whole(one)).cost < least:

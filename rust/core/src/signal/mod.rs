@@ -6,10 +6,12 @@ mod detrend;
 mod drive;
 mod frequency_response;
 pub mod metrics;
+mod noise;
 mod turning_points;
 
 pub use delay::delayed;
 pub use drive::{Drive, Hold, INTERVALS, NEVER, Stop};
+pub use noise::sample_noise;
 pub use turning_points::turns;
 
 pub(crate) use delay::FractionalDelay;

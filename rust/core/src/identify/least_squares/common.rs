@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 use super::weights_record::WeightsRecord;
 use crate::identify::records::thinned::Thinned;
 use crate::models::{AnySuperposition, Model};
-use crate::signal::{Stop, index, range};
+use crate::signal::{Stop, index, range, sample_noise};
 
 /// Least share of the mean slope that passes without memory: with less the inverse is no use.
 const LEAST_LINEAR: f64 = 1e-3;
@@ -24,6 +24,8 @@ pub(super) struct Common<'a> {
     pub drive: (f64, f64),
     /// Largest range of the displacement in a window, m.
     pub stroke: f64,
+    /// Noise of the readings, of the record that has most, m.
+    pub noise: f64,
     /// Simulations so far.
     evaluations: AtomicUsize,
 }
@@ -38,9 +40,10 @@ impl<'a> Common<'a> {
         let span = |one: &WeightsRecord<'a>| range(&one.y[one.start..]);
         let stroke = records.iter().map(span).map(|(low, high)| high - low).fold(0.0, f64::max);
         let drive = ends(records.iter().map(|one| range(&one.drive.u[one.start..])));
+        let noise = records.iter().map(|one| sample_noise(&one.y[one.start..])).fold(0.0, f64::max);
         let weights = records.iter().map(|one| one.weight).collect();
         let evaluations = AtomicUsize::new(0);
-        Self { model, of, records, weights, falls, stop, drive, stroke, evaluations }
+        Self { model, of, records, weights, falls, stop, drive, stroke, noise, evaluations }
     }
 
     /// Counts simulations.

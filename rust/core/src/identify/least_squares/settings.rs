@@ -92,10 +92,14 @@ pub(super) const MODE_GAIN: f64 = 0.02;
 
 /// Shares of the deviation that a history, creep, a drift and a lag have to take away.
 pub(super) const HISTORY_GAIN: f64 = 0.02;
-pub(super) const EARLIER_DRIVE_GAIN: f64 = 0.2;
 pub(super) const CREEP_GAIN: f64 = 0.015;
 pub(super) const DRIFT_GAIN: f64 = 0.015;
 pub(super) const LAG_GAIN: f64 = 0.01;
+
+/// Shares that a voltage which the stage came from has to take away: at least, and of what is above
+/// the noise. That is an error of the model, of which such a voltage takes up some by itself.
+pub(super) const VOLTAGE_GAIN: f64 = 0.04;
+pub(super) const VOLTAGE_GAIN_ABOVE_NOISE: f64 = 0.2;
 
 /// Share of the deviation that a lag of a stage that creeps has to take away, and one in place of
 /// creep: relaxations faster than the drive's period turn its phase as a lag does.

@@ -1,7 +1,7 @@
 //! Histories of a record: the fit with another one, and the voltage that the stage came from.
 
 use crate::identify::least_squares::settings::{
-    EARLIER_DRIVE_GAIN, FIRST_SHARE, HISTORY_GAIN, ROUGH, STEPS,
+    FIRST_SHARE, HISTORY_GAIN, ROUGH, STEPS, VOLTAGE_GAIN, VOLTAGE_GAIN_ABOVE_NOISE,
 };
 use crate::identify::least_squares::solving::fit::{Beginning, Fit};
 use crate::identify::records::history::History;
@@ -11,11 +11,14 @@ use crate::signal::{index, range};
 const FEW_STEPS: usize = 2;
 
 /// Share of the deviation that a history has to take away beside that of a stage which never moved.
-pub(super) fn history_gain(history: History) -> f64 {
+pub(super) fn history_gain(fit: &Fit<'_>, history: History) -> f64 {
     match history {
         History::Virgin => 0.0,
         History::Settled => HISTORY_GAIN,
-        History::Fitted => EARLIER_DRIVE_GAIN,
+        History::Fitted => {
+            let above_noise = 1.0 - fit.common.noise / fit.rms;
+            f64::max(VOLTAGE_GAIN, VOLTAGE_GAIN_ABOVE_NOISE * above_noise)
+        }
     }
 }
 

@@ -61,7 +61,7 @@ impl Refinement<'_> {
         for (r, record) in fit.common.records.iter().enumerate() {
             // Each history with more freedom has to take its share away.
             if record.history.is_none() {
-                cost += history_gain(fit.begins[r].history);
+                cost += history_gain(fit, fit.begins[r].history);
             }
             if record.drift == DriftKind::Auto && fit.drifts[r].is_some() {
                 cost += DRIFT_GAIN;

@@ -324,7 +324,7 @@ fn begun<'a>(fit: &Fit<'a>, settings: &Settings, r: usize, history: History) -> 
 fn choose_history(fit: &mut Fit<'_>, settings: &Settings, r: usize) -> Option<()> {
     let tried = [History::Virgin, History::Settled, History::Fitted];
     for trial in with_each(&tried, |history| begun(fit, settings, r, *history))? {
-        let gain = f64::max(HISTORY_GAIN, history_gain(trial.begins[r].history));
+        let gain = f64::max(HISTORY_GAIN, history_gain(fit, trial.begins[r].history));
         if trial.rms < fit.rms && trial.deviation_of(r) < (1.0 - gain) * fit.deviation_of(r) {
             *fit = trial;
         }
