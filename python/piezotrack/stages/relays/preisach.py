@@ -92,7 +92,8 @@ class PreisachStage(Stage):
     corner.
 
     An identification finds `linear` and the masses, on levels that divide the range of the drive:
-    6 intervals, or 12 where they foretell a third of the window better that was left out.
+    6 intervals, or 12 where they foretell a third of the window better that was left out; and one
+    beyond it for relays that switch once, on the first way of a stage that never moved before.
     A record determines the masses of the cells whose relays its drive switches.
 
     Examples
