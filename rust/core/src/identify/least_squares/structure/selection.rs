@@ -24,8 +24,9 @@ use crate::math::least;
 use crate::models::Nodes;
 use crate::signal::index;
 
-/// Rounds over the numbers of an envelope, at most.
+/// Rounds over the numbers of an envelope, at most; and beside dynamics, where each takes longer.
 const SHAPE_ROUNDS: usize = 20;
+const FEW_SHAPE_ROUNDS: usize = 4;
 
 /// Least share by which a number of an envelope has to lower the deviation before it leaves the
 /// middle of its range: what a record does not determine is not changed.
@@ -261,7 +262,9 @@ fn replace_corners(fit: &mut Fit<'_>) -> Option<()> {
 fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
     let ranges: Vec<(f64, f64)> = fit.common.of.shapes().iter().map(|one| one.range).collect();
     let mut released = vec![false; ranges.len()];
-    for _ in 0..SHAPE_ROUNDS {
+    let (rounds, gain) =
+        if fit.form == Form::None { (SHAPE_ROUNDS, 1e-5) } else { (FEW_SHAPE_ROUNDS, ROUGH) };
+    for _ in 0..rounds {
         let round = fit.rms;
         for (i, &range) in ranges.iter().enumerate() {
             let here = fit.clone();
@@ -269,15 +272,17 @@ fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
             least(range, 1e-4, |place| {
                 let mut trial = best.clone();
                 trial.reshape(i, place);
-                trial.settle(1e-5)?;
+                trial.held = true;
+                trial.settle(gain)?;
+                trial.held = false;
                 let rms = trial.rms;
                 if rms < best.rms {
                     best = trial;
                 }
                 Some(rms)
             })?;
-            let gain = if released[i] { 0.0 } else { SHAPE_GAIN };
-            if best.rms < (1.0 - gain) * here.rms {
+            let least = if released[i] { 0.0 } else { SHAPE_GAIN };
+            if best.rms < (1.0 - least) * here.rms {
                 released[i] = true;
                 *fit = best;
             }
