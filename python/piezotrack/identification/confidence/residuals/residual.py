@@ -39,7 +39,7 @@ MOST, LEAST = 20_000, 100
 CLEAR, AHEAD = 20.0, 10.0
 # Least share of the systematic residual that it explains beside a loop of another shape; or both
 # alone, and of what such a loop leaves. Least share of the whole residual.
-SHARE, ALONE, WORTH = 0.18, 0.5, 0.15
+SHARE, ALONE, WORTH = 0.2, 0.5, 0.15
 # Difference of what two explain, as a share, that a model which is not exact may make.
 ALIKE = 0.02
 # Share of its square by which the noise is not known.
@@ -187,7 +187,7 @@ def residual_of(fit: Identification, record: int = 0) -> Residual:
     Each ingredient that the model may lack, as creep or a mode, is fitted to the residual as a
     group of regressors, with all that the parameters of the model and a symmetric loop of another
     shape can do. A cause is named where it explains at least 15 % of the squared residual beyond
-    that, and 18 % of what is not noise; or half of this alone, and half of what the loop leaves;
+    that, and a fifth of what is not noise; or half of this alone, and half of what the loop leaves;
     and where that or what it explains alone is more than the loop does. Its criterion (Schwarz
     1978, doi 10.1214/aos/1176344136) is the lowest by 10 or more, and what it explains is more by
     2 %, or by what it leaves unexplained itself. A mode that explains no more than a delay is taken
