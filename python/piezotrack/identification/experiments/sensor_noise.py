@@ -239,8 +239,11 @@ def identify_noise(log: Dataset) -> Noise:
     0.097 um rms in steps of 0.038 um
     """
     expect("log", log, Dataset, "pt.Dataset")
-    if np.ptp(log.u) > 0.0 and np.ptp(log.y) > 0.0:
-        alike = float(np.corrcoef(log.u, log.y)[0, 1])
+    ranges = np.ptp(log.u), np.ptp(log.y)
+    if min(ranges) > 0.0:
+        # From 0 to 1: the squares of small readings would be no numbers.
+        drive, motion = (log.u - log.u.min()) / ranges[0], (log.y - log.y.min()) / ranges[1]
+        alike = float(np.corrcoef(drive, motion)[0, 1])
         if abs(alike) > FOLLOWS:
             raise DataError(
                 f"the displacement follows the drive, which goes from {log.u.min():.4g} to "

@@ -303,7 +303,7 @@ def first_samples(rest: Array, data: Dataset) -> list[str]:
     """
     squares = np.cumsum((rest - rest.mean()) ** 2)
     count = math.floor(FIRST * rest.size)
-    if not carried_by_first_samples(rest):
+    if squares[-1] == 0.0 or not carried_by_first_samples(rest):
         return []
     # As far as the residual is well above that of the rest.
     later = (squares[-1] - squares[count - 1]) / (rest.size - count)

@@ -49,7 +49,7 @@ class LeastSquares:
         and half of the window. ``"auto"``: two a decade apart, where the record shows them.
     dynamics : {"auto", "first", "second"} or None, optional
         ``"first"``: a first-order lag, which also approximates a delayed reading. ``"second"``: a
-        mode, of at least three cycles in the window and at most 0.9 cycles a sample. None:
+        mode, of at least three cycles in the window and at most 0.75 cycles a sample. None:
         neither. ``"auto"``: a mode where the record shows one, else the smallest lag that
         explains it within 1 %, which may be none.
 

@@ -27,6 +27,9 @@ __all__ = ["voltage_of_rest", "with_rest", "with_rest_tried"]
 COARSE, ABOUT = 9, 6
 # Samples of the beginning of a record on which they are compared.
 FIRST = 1500
+# Ratio of residuals of the beginning that are alike, how many of their voltages are tried on the
+# whole record, and ratio of its residual to that of the beginning that ends this.
+ALIKE, TRIED, APART = 1.1, 3, 1.5
 # Fits with a voltage of rest that was found from the one before, at most.
 ROUNDS = 3
 
@@ -102,10 +105,22 @@ def with_rest(
     fit = _at_rest(problem, identify, 0.0 if known is None else known)
     if known is None and carried_by_first_samples(_left(fit, fit.data)):
         begun = _begun(problem)
-        volts = least_voltage(
-            lambda volts: _at_rest(begun, identify, volts).cost, _voltages(data), (COARSE, ABOUT)
-        )
-        best = _at_rest(problem, identify, volts)
+        costs: dict[float, float] = {}
+
+        def cost(volts: float) -> float:
+            costs[volts] = _at_rest(begun, identify, volts).cost
+            return costs[volts]
+
+        least = costs[least_voltage(cost, _voltages(data), (COARSE, ABOUT))]
+        # The beginning may explain several voltages alike, of which the whole record shows one.
+        alike = [
+            volts for volts in sorted(costs, key=costs.__getitem__) if costs[volts] < ALIKE * least
+        ]
+        best = fit
+        for volts in alike[:TRIED]:
+            best = min(best, _at_rest(problem, identify, volts), key=lambda one: one.cost)
+            if best.cost < APART * least:
+                break
         fit = best if best.cost < (1.0 - GAIN) * fit.cost else fit
     for _ in range(ROUNDS):
         better = best_voltage(fit, data)

@@ -21,7 +21,7 @@ const MOST_ROWS: usize = 6000;
 const GRID: [(f64, f64); 3] = [(0.02, 1.03), (0.07, 1.08), (0.25, 1.2)];
 
 /// Highest frequency, in cycles a sample.
-const HIGHEST: f64 = 0.9;
+const HIGHEST: f64 = 0.75;
 
 /// Fewest cycles of a mode in the window.
 const CYCLES: f64 = 3.0;

@@ -9,7 +9,7 @@ const LONGEST_LAG: f64 = 0.1;
 const SHORTEST_LAG: f64 = 0.02;
 
 /// Highest frequency of a mode, in cycles a sample.
-const HIGHEST: f64 = 0.9;
+const HIGHEST: f64 = 0.75;
 
 /// Fewest cycles of a mode in a record.
 const CYCLES: f64 = 3.0;

@@ -87,13 +87,17 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     fit.every = common.records.iter().map(every).collect();
     fit.settle(ROUGH)?;
     if let Some(start) = &settings.start {
+        place_corners(&mut fit, settings.zones);
+        fit.settle(ROUGH)?;
         return resumed(fit, settings, start);
     }
-    bend(&mut fit, settings)?;
+    search_shape(&mut fit)?;
+    place_corners(&mut fit, settings.zones);
+    fit.settle(ROUGH)?;
     let mode = first_mode(&mut fit, settings)?;
     if mode {
         // What rings hides the shape.
-        bend(&mut fit, settings)?;
+        search_shape(&mut fit)?;
     }
     if let CreepKind::Times(times) = &settings.creep {
         fit.restructure(|fit| fit.times.clone_from(times));
@@ -179,7 +183,7 @@ fn resumed<'a>(mut fit: Fit<'a>, settings: &Settings, start: &Structure) -> Opti
     }
     fit.set_poles(form, &poles);
     fit.settle(ROUGH)?;
-    bend(&mut fit, settings)?;
+    search_shape(&mut fit)?;
     for r in 0..fit.begins.len() {
         let history = fit.begins[r].history;
         fit = begun(&fit, settings, r, history)?;
@@ -214,13 +218,6 @@ fn with_slow_and_late<'a>(
     choose_slow(&mut fit, settings)?;
     choose_dynamics_and_creep(&mut fit, settings, mode)?;
     Some(fit)
-}
-
-/// The shape of the envelopes, and dead zones, anew.
-fn bend(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
-    search_shape(fit)?;
-    place_corners(fit, settings.zones);
-    fit.settle(ROUGH)
 }
 
 /// Spreads the dead zones over what comes out of the plays in the windows.
