@@ -20,8 +20,9 @@ const MOST_ROWS: usize = 6000;
 /// Damping ratios of the grid, each with the ratio of neighbouring frequencies.
 const GRID: [(f64, f64); 3] = [(0.02, 1.03), (0.07, 1.08), (0.25, 1.2)];
 
-/// Highest frequency, in cycles a sample.
-const HIGHEST: f64 = 0.75;
+/// Highest frequency of a mode, in cycles a sample: above half of one, the drive between the samples
+/// tells it from the slower mode that rings alike at them.
+pub(in crate::identify) const HIGHEST: f64 = 0.75;
 
 /// Fewest cycles of a mode in the window.
 const CYCLES: f64 = 3.0;

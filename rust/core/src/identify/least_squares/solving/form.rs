@@ -1,5 +1,6 @@
 //! Linear dynamics as logarithms of their numbers, and weights of modes, which are found.
 
+use crate::identify::records::resonances::HIGHEST;
 use crate::models::{Dynamics, Mode};
 
 /// Longest lag that is searched, as a share of the record.
@@ -7,9 +8,6 @@ const LONGEST_LAG: f64 = 0.1;
 
 /// Shortest lag, in samples: a shorter one shows nowhere.
 const SHORTEST_LAG: f64 = 0.02;
-
-/// Highest frequency of a mode, in cycles a sample.
-const HIGHEST: f64 = 0.75;
 
 /// Fewest cycles of a mode in a record.
 const CYCLES: f64 = 3.0;

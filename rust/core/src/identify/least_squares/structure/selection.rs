@@ -86,14 +86,14 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     let every = |one: &WeightsRecord<'_>| one.samples().div_ceil(rows_of(common));
     fit.every = common.records.iter().map(every).collect();
     fit.settle(ROUGH)?;
-    if let Some(start) = &settings.start {
-        place_corners(&mut fit, settings.zones);
-        fit.settle(ROUGH)?;
-        return resumed(fit, settings, start);
+    if settings.start.is_none() {
+        search_shape(&mut fit)?;
     }
-    search_shape(&mut fit)?;
     place_corners(&mut fit, settings.zones);
     fit.settle(ROUGH)?;
+    if let Some(start) = &settings.start {
+        return resumed(fit, settings, start);
+    }
     let mode = first_mode(&mut fit, settings)?;
     if mode {
         // What rings hides the shape.
@@ -104,10 +104,9 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         fit.settle(ROUGH)?;
     }
     let refinement = Refinement { settings, shown: mode };
-    let mut starts = vec![None];
-    if fit.common.records.len() == 1 && fit.common.records[0].history.is_none() {
-        starts = [History::Virgin, History::Settled, History::Fitted].map(Some).to_vec();
-    }
+    let open = fit.common.records.len() == 1 && fit.common.records[0].history.is_none();
+    let each = [History::Virgin, History::Settled, History::Fitted].map(Some);
+    let starts = if open { each.to_vec() } else { vec![None] };
     let begun = with_each(&starts, |history| with_slow_and_late(&fit, settings, mode, *history))?;
     let mut begun = distinct(begun);
     begun.sort_by(|a, b| refinement.cost(a).total_cmp(&refinement.cost(b)));
