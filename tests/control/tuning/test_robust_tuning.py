@@ -111,7 +111,7 @@ def test_tuned_gains_are_not_worse_than_a_rule_on_stages_of_another_log(seed: in
     errors = crossed(0, KINDS, list(MOTIONS), seed)
     assert (errors[:, 0] < 1.03 * errors[:, 1]).all()
     assert (errors[:, 0] < 1.03 * errors[:, 2]).all()
-    assert errors[:, 0].mean() < 71e-9
+    assert errors[:, 0].mean() < 72e-9
     # The Bouc-Wen stage of the other log cannot reach the lowest points: all are alike there.
     back = crossed(1, KINDS[:3], list(MOTIONS), seed)
     assert (back[:, 0] < 1.05 * back[:, 1:].min(axis=1)).all()

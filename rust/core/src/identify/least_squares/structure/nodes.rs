@@ -3,7 +3,9 @@
 use core::ops::Range;
 
 use crate::identify::least_squares::common::Common;
-use crate::identify::least_squares::settings::{NodesKind, ROUGH, SAME, STEPS, Settings};
+use crate::identify::least_squares::settings::{
+    HISTORY_GAIN, NodesKind, ROUGH, SAME, STEPS, Settings,
+};
 use crate::identify::least_squares::solving::fit::Fit;
 use crate::math::on_all_threads;
 use crate::models::{MOST_PLAYS, Nodes};
@@ -112,6 +114,29 @@ pub(super) fn add_once(fit: &mut Fit<'_>, gain: f64) -> Option<()> {
     trial.settle(ROUGH)?;
     if trial.rms < (1.0 - gain) * fit.rms {
         *fit = trial;
+    }
+    Some(())
+}
+
+/// Leaves out the plays or relays that move once where they explain too little beside what was
+/// chosen after them: what they stood for may be explained by now.
+pub(super) fn drop_once(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+    if settings.nodes != NodesKind::Auto || !has_once(fit) {
+        return Some(());
+    }
+    let (low, high) = fit.common.reached();
+    let reach = reach(fit.common);
+    let inside = |node: &f64| match fit.common.of.nodes() {
+        Nodes::None => true,
+        Nodes::Thresholds => *node < reach,
+        Nodes::Levels => (low..=high).contains(node),
+    };
+    let nodes: Vec<f64> = fit.nodes.iter().copied().filter(inside).collect();
+    let mut bare = fit.clone();
+    bare.restructure(|bare| bare.nodes = nodes);
+    bare.settle(ROUGH)?;
+    if (1.0 - HISTORY_GAIN) * bare.rms <= fit.rms {
+        *fit = bare;
     }
     Some(())
 }

@@ -5,7 +5,7 @@
 use super::histories::{fitted_history, history_gain, with_history};
 use super::lag::{best_lag, relaxes_as_well, smallest_lag};
 use super::modes::{drop_modes, first_mode};
-use super::nodes::{add_once, choose_nodes, few_or_many, spread};
+use super::nodes::{add_once, choose_nodes, drop_once, few_or_many, spread};
 use super::refinement::{FIRST_ROUNDS, ROUNDS, Refinement};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
@@ -121,6 +121,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     let mut fit = found.into_iter().reduce(better)?;
     choose_nodes(&mut fit, settings)?;
     refinement.refine(&mut fit, ROUNDS)?;
+    drop_once(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
     with_range_of_lags(fit, settings)
@@ -190,6 +191,7 @@ fn resumed<'a>(mut fit: Fit<'a>, settings: &Settings, start: &Structure) -> Opti
     let refinement = Refinement { settings, shown: matches!(form, Form::Modes(_)) };
     refinement.refine(&mut fit, ROUNDS)?;
     choose_nodes(&mut fit, settings)?;
+    drop_once(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
     if start.kept { with_range_of_lags(fit, settings) } else { Some(fit) }
@@ -212,6 +214,9 @@ fn with_slow_and_late<'a>(
     choose_histories(&mut fit, settings, history)?;
     if lags {
         fit.set_poles(Form::None, &[]);
+        // Where the dead zones have moved beside the lag, they would stay.
+        let corners = fit.layout().corners();
+        fit.x[corners].copy_from_slice(&from.x[from.layout().corners()]);
         fit.settle(ROUGH)?;
     }
     choose_slow(&mut fit, settings)?;
