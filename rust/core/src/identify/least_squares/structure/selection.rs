@@ -297,7 +297,7 @@ fn search_shape(fit: &mut Fit<'_>) -> Option<()> {
 
 /// The histories that were set, or one that is held, or the simplest ones that explain the records.
 fn choose_histories(fit: &mut Fit<'_>, settings: &Settings, held: Option<History>) -> Option<()> {
-    let open = held.is_none() && fit.common.records.iter().any(|one| one.history.is_none());
+    let open = fit.common.records.iter().any(|one| one.history.is_none());
     if open && settings.creep == CreepKind::Auto {
         // With creep, or what it does would be taken for a history.
         let times = creeps(fit).pop().unwrap_or_default();
