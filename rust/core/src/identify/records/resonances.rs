@@ -21,7 +21,7 @@ const MOST_ROWS: usize = 6000;
 const GRID: [(f64, f64); 3] = [(0.02, 1.03), (0.07, 1.08), (0.25, 1.2)];
 
 /// Highest frequency of a mode, in cycles a sample: above half of one, the drive between the samples
-/// tells it from the slower mode that rings alike at them.
+/// distinguishes it from the slower mode that rings alike at them.
 pub(in crate::identify) const HIGHEST: f64 = 0.75;
 
 /// Fewest cycles of a mode in the window.

@@ -83,17 +83,21 @@ fn beyond(common: &Common<'_>) -> Option<f64> {
     }
 }
 
-/// Whether some of the plays or relays move once and never back.
-fn has_once(fit: &Fit<'_>) -> bool {
-    let (Some(first), Some(last)) = (fit.nodes.first(), fit.nodes.last()) else { return false };
-    match fit.common.of.nodes() {
+/// Whether the play or the relays of a node move once and never back.
+fn moves_once(common: &Common<'_>, node: f64) -> bool {
+    match common.of.nodes() {
         Nodes::None => false,
-        Nodes::Thresholds => *last >= reach(fit.common),
+        Nodes::Thresholds => node >= reach(common),
         Nodes::Levels => {
-            let (low, high) = fit.common.reached();
-            *first < low || *last > high
+            let (low, high) = common.reached();
+            !(low..=high).contains(&node)
         }
     }
+}
+
+/// Whether some of the plays or relays move once and never back.
+fn has_once(fit: &Fit<'_>) -> bool {
+    fit.nodes.iter().any(|node| moves_once(fit.common, *node))
 }
 
 /// Adds the plays or relays that move once where they explain more than a share `gain` of the
@@ -124,16 +128,8 @@ pub(super) fn drop_once(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
     if settings.nodes != NodesKind::Auto || !has_once(fit) {
         return Some(());
     }
-    let (low, high) = fit.common.reached();
-    let reach = reach(fit.common);
-    let inside = |node: &f64| match fit.common.of.nodes() {
-        Nodes::None => true,
-        Nodes::Thresholds => *node < reach,
-        Nodes::Levels => (low..=high).contains(node),
-    };
-    let nodes: Vec<f64> = fit.nodes.iter().copied().filter(inside).collect();
     let mut bare = fit.clone();
-    bare.restructure(|bare| bare.nodes = nodes);
+    bare.restructure(|bare| bare.nodes.retain(|node| !moves_once(fit.common, *node)));
     bare.settle(ROUGH)?;
     if (1.0 - HISTORY_GAIN) * bare.rms <= fit.rms {
         *fit = bare;
