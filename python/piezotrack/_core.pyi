@@ -719,6 +719,7 @@ def identify_weights(
     dynamics: str,
     start: Structure | None,
     threads: int,
+    stopped: Callable[[], bool] | None = None,
 ) -> LeastSquaresFit: ...
 def resonances(
     *, u: ArrayLike, y: ArrayLike, dt: float, hold_name: str, start: int, most: int

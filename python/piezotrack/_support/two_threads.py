@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+    from concurrent.futures import Future
 
-__all__ = ["one_by_one", "two_threads"]
+__all__ = ["one_by_one", "two_threads", "waited_for"]
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -56,6 +57,22 @@ def one_by_one(
         The results, in the order of the values.
     """
     for future in [pool.submit(function, value) for value in values]:
-        while not future.done():
-            wait([future], timeout=LONGEST)
-        yield future.result()
+        yield waited_for(future)
+
+
+def waited_for(future: Future[R]) -> R:
+    """Wait for a result, or for Ctrl-C.
+
+    Parameters
+    ----------
+    future : Future
+        What is computed in a pool.
+
+    Returns
+    -------
+    object
+        Its result.
+    """
+    while not future.done():
+        wait([future], timeout=LONGEST)
+    return future.result()

@@ -28,6 +28,8 @@ pub struct Watchers {
     pub progress: Option<Py<PyAny>>,
     /// Keeps what is computed.
     pub journal: Option<Arc<dyn Journal>>,
+    /// Called now and then: whether the job is to stop, of one on a thread that no signal reaches.
+    pub stopped: Option<Py<PyAny>>,
 }
 
 /// Why a job was stopped from Python.
@@ -48,10 +50,16 @@ impl Halt {
         }
     }
 
-    fn look_at_signals(&self) {
+    fn look_at_signals(&self, stopped: Option<&Py<PyAny>>) {
         self.with_python(|py| {
-            if let Err(error) = py.check_signals() {
-                self.stop(py, error);
+            let asked = py.check_signals().and_then(|()| match stopped {
+                Some(stopped) => stopped.call0(py)?.is_truthy(py),
+                None => Ok(false),
+            });
+            match asked {
+                Ok(false) => {}
+                Ok(true) => self.stop(py, PyKeyboardInterrupt::new_err("interrupted")),
+                Err(error) => self.stop(py, error),
             }
         });
     }
@@ -86,7 +94,7 @@ pub fn enter<T: Send>(
             if let Ok(mut last) = last.lock()
                 && last.elapsed() >= POLL
             {
-                halt.look_at_signals();
+                halt.look_at_signals(None);
                 *last = Instant::now();
             }
             halt.stopped()
@@ -156,7 +164,17 @@ pub fn enter_quiet_pool<T: Send>(
     threads: usize,
     job: impl FnOnce(Stop<'_>) -> piezotrack_core::Result<T> + Send,
 ) -> PyResult<T> {
-    let quiet = Watchers { callback: None, progress: None, journal: None };
+    enter_quiet_pool_until(py, threads, None, job)
+}
+
+/// The same, until `stopped` says so.
+pub fn enter_quiet_pool_until<T: Send>(
+    py: Python<'_>,
+    threads: usize,
+    stopped: Option<Py<PyAny>>,
+    job: impl FnOnce(Stop<'_>) -> piezotrack_core::Result<T> + Send,
+) -> PyResult<T> {
+    let quiet = Watchers { callback: None, progress: None, journal: None, stopped };
     let (result, stopped) = enter_pool(py, threads, &quiet, |_, stop| {
         let result = job(stop);
         Ok((result, stop()))
@@ -182,7 +200,7 @@ fn watch(
             Err(RecvTimeoutError::Disconnected) => return,
         }
         if looked.elapsed() >= POLL {
-            halt.look_at_signals();
+            halt.look_at_signals(watchers.stopped.as_ref());
             looked = Instant::now();
         }
     }

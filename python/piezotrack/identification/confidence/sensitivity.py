@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ... import _core
+from ..._support.two_threads import one_by_one, two_threads
 from ...errors import ParameterError, PiezotrackError
 from ..fitted.identified_model import IdentifiedModel
 from ..fitted.start import same_beginning, start_after, start_at_jump
@@ -354,18 +355,18 @@ def changes(
         Change with each value, in the unit of the value [m/...]; 0 where there is no such stage
         beside it.
     """
-    columns = []
-    for value in values:
+
+    def change(value: Value) -> Array:
         share = FROM_ZERO if value.of(model) == 0.0 else STEP
         size = LATER * dt if value.parameter == DELAY else share * _size(model, value)
         for ways in ((1.0, -1.0), (1.0, 0.0), (0.0, -1.0)):
             up, down = (moved(model, [value], np.array([size * way])) for way in ways)
             if up is not None and down is not None:
-                columns.append((motion(up) - motion(down)) / (size * (ways[0] - ways[1])))
-                break
-        else:
-            columns.append(np.zeros_like(motion(model)))
-    return np.array(columns)
+                return (motion(up) - motion(down)) / (size * (ways[0] - ways[1]))
+        return np.zeros_like(motion(model))
+
+    with two_threads() as pool:
+        return np.array(list(one_by_one(pool, change, values)))
 
 
 class LinearisedRecord:

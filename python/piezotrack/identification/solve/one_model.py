@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,8 @@ from .variants.exponent import with_exponent_tried
 from .weights import solve_least_squares
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from ..fitted.identification import Identification
     from ..fitted.start import History
     from ..methods.choice import Method, Search
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
     from .run import Run
     from .weights import Structure
 
-__all__ = ["identify_model"]
+__all__ = ["identify_model", "weights_of"]
 
 # Parts of the time of descents and of a swarm, for the progress: without an earlier motion, and
 # with it.
@@ -102,9 +105,33 @@ def _weights(
     problem: Problem, method: LeastSquares, run: Run, start: Structure | None
 ) -> Identification:
     """Find the weights of a model by least squares."""
+    with weights_of(problem.model, run):
+        return solve_least_squares(problem, method, run, start)
+
+
+@contextmanager
+def weights_of(model: str, run: Run) -> Iterator[None]:
+    """Show that weights of a model are being found, and say so where Ctrl-C comes.
+
+    Parameters
+    ----------
+    model : str
+        Name of the model.
+    run : Run
+        How it is run.
+
+    Yields
+    ------
+    None
+
+    Raises
+    ------
+    Interrupted
+        Ctrl-C came.
+    """
     try:
-        with ProgressBar(run.progress, f"identify: {problem.model}, least squares"):
-            return solve_least_squares(problem, method, run.threads, start)
+        with ProgressBar(run.progress, f"identify: {model}, least squares"):
+            yield
     except KeyboardInterrupt:
         raise Interrupted("interrupted before the weights were found") from None
 

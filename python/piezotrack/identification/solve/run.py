@@ -31,6 +31,8 @@ class Run:
         Called with a `Progress` after every iteration of a search.
     checkpoint : _core.Checkpoint or None
         What a search keeps its simulations in.
+    stopped : callable or None
+        Whether least squares are to stop: those in a thread, which Ctrl-C does not reach.
 
     Raises
     ------
@@ -42,6 +44,7 @@ class Run:
     progress: bool | None = None
     callback: Callable[[Progress], object] | None = None
     checkpoint: _core.Checkpoint | None = None
+    stopped: Callable[[], bool] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "threads", _core.as_count("threads", self.threads))

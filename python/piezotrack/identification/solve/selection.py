@@ -4,26 +4,29 @@ from __future__ import annotations
 
 import math
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from threading import Event
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ... import _core
 from ..._support.display.progress_parts import Parts
 from ..._support.statistics import sample_noise
+from ..._support.two_threads import two_threads, waited_for
 from ...errors import DataError, NumericalError
 from ...stages.registry import model_named
 from ..fitted.selection import Selection, Trial
 from ..methods.least_squares import LeastSquares
 from .jump import voltage_of_rest
-from .one_model import identify_model
+from .one_model import identify_model, weights_of
 from .weights import Structure
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
+    from concurrent.futures import Future, ThreadPoolExecutor
 
     from numpy.typing import NDArray
 
@@ -61,7 +64,8 @@ LEAST_SAMPLES = 100
 # A residual of so many times the noise, on what was not fitted, is good enough to try no more; one
 # of so many times is good enough to search none.
 AS_NOISE, NEAR_NOISE = 1.5, 2.0
-# A fit to the whole records that leaves so many times the noise is not made anew.
+# A fit to the whole records that leaves so many times the noise is not made anew; one to their
+# first parts has a right structure, beside which none is searched.
 NOTHING_BUT_NOISE = 1.2
 # Correlation of residuals up to so many samples apart that is that of noise; and what chance makes
 # of it, in standard deviations.
@@ -118,37 +122,28 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     infos = models_tried(problem.records[0].data, problem.parameters)
     # About how long each takes; the best is fitted once more at the end.
     shares = Parts([*(SLOWER if info.searched else 1.0 for info in infos), 1.0])
-    for i, info in enumerate(infos):
-        if info.searched and trials.least < NEAR_NOISE:
-            break
-        if not trials.near_best(CONTAINED.get(info.name)):
-            continue
-        with shares.begin(i):
-            enough = trials.run(info)
-        if enough:
-            break
+    with trials.side_by_side([info for info in infos if not info.searched]):
+        for i, info in enumerate(infos):
+            if info.searched and (trials.least < NEAR_NOISE or trials.fitted < NOTHING_BUT_NOISE):
+                break
+            if not trials.near_best(CONTAINED.get(info.name)):
+                continue
+            with shares.begin(i):
+                enough = trials.run(info)
+            if enough:
+                break
     if not trials.found:
         raise trials.refused or DataError("no model could be fitted")
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
 
-    def begun(one: Tried, start: Structure | None) -> Identification:
-        """Fit a model to the whole records from the structure of their first parts."""
-        method = methods.method(one.info)
-        return identify_model(trials.whole(problem, one.info), method, run, start, one.rest)
-
-    def whole(one: Tried) -> Identification:
-        if one.start is None or not methods.weights._resumes:
-            return begun(one, None)
-        # The structure of the first part is that of the whole where nothing but noise is left.
-        fit = begun(one, replace(one.start, kept=True))
-        if fit.cost < NOTHING_BUT_NOISE * min(fit.noises):
-            return fit
-        method = methods.method(one.info)
-        anew = identify_model(trials.whole(problem, one.info), method, run)
-        return anew if anew.cost < fit.cost else fit
+    def whole(one: Tried, start: Structure | None) -> Identification:
+        """Fit a model to the whole records, from the structure of their first parts or anew."""
+        kept = None if start is None else replace(start, kept=True)
+        of_model = trials.whole(problem, one.info)
+        return identify_model(of_model, methods.method(one.info), run, kept, one.rest)
 
     with shares.begin(len(infos)):
-        fit = whole(best)
+        fit = whole(best, best.start)
         noise = max(noise_of(record.data) for record in problem.records)
         if best.info.name == MANY_WEIGHTS or fit.cost > NEAR_NOISE * noise:
             # The first part does not show all that the whole record does.
@@ -157,8 +152,12 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
                 least = fit.cost / (1.0 - BETTER_ON_WHOLE)
             for one in trials.others(best):
                 with suppress(DataError, NumericalError):
-                    if begun(one, one.start).cost < least and (other := whole(one)).cost < least:
-                        fit, least = other, other.cost
+                    if (other := whole(one, one.start)).cost < least:
+                        best, fit, least = one, other, other.cost
+        # The structure of the first part is that of the whole where nothing but noise is left.
+        resumed = best.start is not None and methods.weights._resumes
+        if resumed and fit.cost >= NOTHING_BUT_NOISE * min(fit.noises):
+            fit = min(fit, whole(best, None), key=lambda one: one.cost)
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
 
 
@@ -175,6 +174,16 @@ class Tried:
     rest: float | None = None
 
 
+class _Attempt(NamedTuple):
+    """A fit to first parts."""
+
+    fit: Identification
+    # What it leaves of the rests [m], whether its inverse is ill-conditioned, and how long it took.
+    left: list[Array]
+    ill: bool
+    seconds: float
+
+
 @dataclass
 class _Trials:
     """Trials on the first parts of records, judged on the rests."""
@@ -185,13 +194,19 @@ class _Trials:
     rests: list[Dataset]
     found: list[Tried] = field(default_factory=list)
     refused: Exception | None = None
-    # Least residual so far, in multiples of the noise.
+    # Least residual so far, in multiples of the noise, on what was not fitted and on what was.
     least: float = math.inf
+    fitted: float = math.inf
     # Structure of the first fit by least squares, which records have a delay in it, and the voltage
     # of rest from which the drive jumped.
     start: Structure | None = None
     delayed: list[bool] = field(default_factory=list)
     rest: float | None = None
+    # Models found by least squares, and those of them that are fitted in threads.
+    by_weights: list[ModelInfo] = field(default_factory=list)
+    pool: ThreadPoolExecutor | None = None
+    begun: dict[str, Future[_Attempt | DataError | NumericalError]] = field(default_factory=dict)
+    ended: Event = field(default_factory=Event)
 
     def near_best(self, name: str | None) -> bool:
         """Return whether a model, if it was tried, comes near the best one."""
@@ -215,21 +230,33 @@ class _Trials:
             return few
         return [*few, *(one for one in others if one.info.name == MANY_WEIGHTS)]
 
+    @contextmanager
+    def side_by_side(self, infos: list[ModelInfo]) -> Iterator[None]:
+        """Begin to fit all other models by least squares in two threads when the first is there."""
+        self.by_weights = infos
+        with two_threads() as pool:
+            self.pool = pool if self.how.threads != 1 else None
+            try:
+                yield
+            finally:
+                self.ended.set()
+                pool.shutdown(wait=False, cancel_futures=True)
+
     def run(self, info: ModelInfo) -> bool:
         """Try a model; return whether it leaves nothing but noise."""
-        begun = time.perf_counter()
-        problem, method = self.problem.of_model(info), self.methods.method(info)
-        try:
-            fit = identify_model(problem, method, self.how, self.start, self.rest)
-            left = [
-                rest.y - fit.simulate(rest, offset=record.offset).x
-                for rest, record in zip(self.rests, fit.records, strict=True)
-            ]
-        except (DataError, NumericalError) as error:
-            self.refused = self.refused or error
+        if info.name in self.begun:
+            with weights_of(info.name, self.how):
+                attempt = waited_for(self.begun[info.name])
+        else:
+            attempt = self.attempt(info, self.how)
+        if not isinstance(attempt, _Attempt):
+            self.refused = self.refused or attempt
             return False
-        if isinstance(method, LeastSquares) and self.start is None:
-            self.start = Structure.of(fit)
+        fit, left = attempt.fit, attempt.left
+        weights = isinstance(fit.method, LeastSquares)
+        start = Structure.of(fit) if weights else None
+        if weights and self.start is None:
+            self.start = start
             # The first model decides whether others have a delay and, where it is near the noise,
             # whether they begin with a jump: one that is not may take for a jump what it lacks.
             if fit.cost < NEAR_NOISE * min(fit.noises):
@@ -243,17 +270,35 @@ class _Trials:
         pairs = list(zip(self.rests, left, strict=True))
         squares = np.array([judged(rest, one) for rest, one in pairs])
         rms = math.sqrt(float(counts @ squares) / float(counts.sum()))
-        ill = bool(fit.model._notes(lambda: fit._responses[0]))
-        seconds = time.perf_counter() - begun
-        start = Structure.of(fit) if isinstance(method, LeastSquares) else None
-        trial = Trial(info.name, info.title, rms, seconds)
-        self.found.append(Tried(trial, info, ill, start, voltage_of_rest(fit)))
+        trial = Trial(info.name, info.title, rms, attempt.seconds)
+        self.found.append(Tried(trial, info, attempt.ill, start, voltage_of_rest(fit)))
+        self.fitted = min(self.fitted, fit.cost / max(min(fit.noises), 1e-300))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
         noise = np.array([noise_of(rest.measured) for rest in self.rests])
         counted = [rest.counted(one) for rest, one in pairs]
         plain = np.array([math.sqrt(float(np.mean(one**2))) for one in counted])
         self.least = min(self.least, float(np.max(plain / np.maximum(noise, 1e-300))))
-        return bool(np.all(plain < AS_NOISE * noise)) and all(is_white(one) for one in counted)
+        enough = bool(np.all(plain < AS_NOISE * noise)) and all(is_white(one) for one in counted)
+        if weights and not enough and not self.begun and self.pool:
+            quiet = replace(self.how, progress=False, stopped=self.ended.is_set)
+            others = self.by_weights[self.by_weights.index(info) + 1 :]
+            self.begun = {one.name: self.pool.submit(self.attempt, one, quiet) for one in others}
+        return enough
+
+    def attempt(self, info: ModelInfo, how: Run) -> _Attempt | DataError | NumericalError:
+        """Fit a model to the first parts, and say what it leaves of the rests."""
+        begun = time.perf_counter()
+        problem, method = self.problem.of_model(info), self.methods.method(info)
+        try:
+            fit = identify_model(problem, method, how, self.start, self.rest)
+            left = [
+                rest.y - fit.simulate(rest, offset=record.offset).x
+                for rest, record in zip(self.rests, fit.records, strict=True)
+            ]
+        except (DataError, NumericalError) as error:
+            return error
+        ill = bool(fit.model._notes(lambda: fit._responses[0]))
+        return _Attempt(fit, left, ill, time.perf_counter() - begun)
 
 
 def _with_delays(problem: Problem, shown: list[bool]) -> Problem:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from ..methods.least_squares import LeastSquares
     from ..problem.problem import Problem
     from ..problem.records import Record
+    from .run import Run
 
 __all__ = ["Structure", "solve_least_squares"]
 
@@ -79,7 +80,7 @@ class Structure:
 
 
 def solve_least_squares(
-    problem: Problem, settings: LeastSquares, threads: int = 0, start: Structure | None = None
+    problem: Problem, settings: LeastSquares, run: Run, start: Structure | None = None
 ) -> Identification:
     """Identify a stage by least squares.
 
@@ -89,8 +90,8 @@ def solve_least_squares(
         The model and the records. The drive before a window is warm-up: simulated, not scored.
     settings : LeastSquares
         Settings.
-    threads : int, optional
-        All cores where it is 0.
+    run : Run
+        How it is run.
     start : Structure, optional
         Structure to begin with, where nothing of it is given.
 
@@ -118,7 +119,8 @@ def solve_least_squares(
         creep_times=_times(settings, longest),
         dynamics=settings.dynamics or "none",
         start=start if settings._resumes else None,
-        threads=threads,
+        threads=run.threads,
+        stopped=run.stopped,
     )
     model = stage_class(info)
     both = zip(records, solution.records, strict=True)

@@ -285,7 +285,7 @@ fn identify(
     let question = problem.question()?;
     let plan = Plan { method: method.into_method(), seed, runs, start };
     let journal = checkpoint.map(|one| one.0.clone() as Arc<dyn Journal>);
-    let watchers = Watchers { callback, progress, journal };
+    let watchers = Watchers { callback, progress, journal, stopped: None };
     let found = enter_pool(py, threads, &watchers, |monitor, stop| {
         let searched = question.searched()?;
         let together: Vec<(&Record<'_>, &Spec)> =

@@ -11,7 +11,7 @@ use piezotrack_core::{Error, Result};
 use pyo3::prelude::*;
 
 use crate::conversions::arrays::samples;
-use crate::enter::{enter, enter_quiet_pool};
+use crate::enter::{enter, enter_quiet_pool_until};
 use crate::errors::raise;
 use crate::identify::problem::{OneRecord, PyProblem};
 use crate::stages::models::{Named, named};
@@ -132,7 +132,7 @@ impl PyStructure {
 /// Identifies a stage by least squares; what is None is chosen.
 #[pyfunction]
 #[pyo3(name = "identify_weights", signature = (problem, *, count, thresholds, zones, creep_times,
-    dynamics, start, threads))]
+    dynamics, start, threads, stopped = None))]
 #[expect(clippy::too_many_arguments, reason = "keyword-only, called from one place")]
 fn fit_weights(
     py: Python<'_>,
@@ -144,6 +144,7 @@ fn fit_weights(
     dynamics: &str,
     start: Option<PyStructure>,
     threads: usize,
+    stopped: Option<Py<PyAny>>,
 ) -> PyResult<PyLeastSquaresFit> {
     let question = problem.question()?;
     let checked = || -> Result<_> {
@@ -161,8 +162,8 @@ fn fit_weights(
     };
     let (records, settings) = checked().map_err(|error| raise(&error))?;
     let job = |stop: Stop<'_>| identify_weights(question.model, &records, &settings, stop);
-    let fit = enter_quiet_pool(py, threads, job)?;
-    // None means stopped, for which `enter_quiet_pool` has raised.
+    let fit = enter_quiet_pool_until(py, threads, stopped, job)?;
+    // None means stopped, for which `enter_quiet_pool_until` has raised.
     fit.map(PyLeastSquaresFit)
         .ok_or_else(|| raise(&Error::Numerical("the search was stopped".into())))
 }

@@ -68,7 +68,7 @@ def with_delay_tried(
         kept = start is not None and start.kept
         late = identify(delayed, Structure.of(fit, kept=kept) if resumes else None, rest)
         if resumes and start is None and late.cost < least:
-            late = identify(delayed, None, rest)
+            late = min(late, identify(delayed, None, rest), key=lambda one: one.cost)
     except (DataError, NumericalError):
         return fit
     return late if late.cost < least else fit

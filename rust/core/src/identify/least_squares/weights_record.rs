@@ -5,7 +5,10 @@ use crate::identify::parameters::delay::Delay;
 use crate::identify::parameters::drift::DriftKind;
 use crate::identify::records::history::History;
 use crate::models::Measures;
-use crate::signal::{Drive, Hold, index};
+use crate::signal::{Drive, Hold, index, range};
+
+/// Share of its range by which a drive jumps from one sample to the next.
+const JUMP: f64 = 0.1;
 
 /// A record: the displacement under a drive, judged from sample `start` on, and what is asked of
 /// it alone.
@@ -85,6 +88,13 @@ impl<'a> WeightsRecord<'a> {
     /// Seconds within which the drive comes to a sample: none where it is held and jumps.
     pub(super) fn step(&self, k: usize) -> f64 {
         if k > 0 && self.drive.hold == Hold::First { self.drive.dt } else { f64::INFINITY }
+    }
+
+    /// Whether the drive jumps: of what follows, every sample shows another part.
+    pub(super) fn jumps(&self) -> bool {
+        let u = &self.drive.u[self.start..];
+        let (low, high) = range(u);
+        u.windows(2).any(|pair| (pair[1] - pair[0]).abs() > JUMP * (high - low))
     }
 
     /// Whether the displacement at a sample counts.

@@ -8,11 +8,13 @@ use crate::signal::{Drive, index};
 const LONGEST_PHASE: f64 = 0.06;
 
 /// Every how many samples a record is thinned to: where its drive is slow all the time, as many as
-/// leave so many rows, else 1.
+/// leave about so many rows, or as its motion allows; else 1.
 pub(in crate::identify) fn thinning(of: &Measures, dt: f64, samples: usize, rows: usize) -> usize {
+    if of.excited().is_some() {
+        return 1;
+    }
     let most = LONGEST_PHASE / (of.frequency * dt);
-    let every = samples / rows;
-    if of.excited().is_none() && index(every) < most { every.max(1) } else { 1 }
+    (1..=samples / rows).rev().find(|every| index(*every) < most).unwrap_or(1)
 }
 
 /// Every so many of the samples of a record.

@@ -8,6 +8,7 @@ use super::layout::{Layout, Own};
 use crate::error::{Error, Result};
 use crate::identify::least_squares::common::Common;
 use crate::identify::least_squares::result::{LeastSquaresFit, RecordFit};
+use crate::identify::least_squares::settings::Structure;
 use crate::identify::least_squares::weights_record::{WeightsDelay, WeightsRecord};
 use crate::identify::parameters::drift::DriftKind;
 use crate::identify::records::history::History;
@@ -407,6 +408,17 @@ impl<'a> Fit<'a> {
             records: records?,
             lag_range: self.lags,
         })
+    }
+
+    /// Structure of the fit, from which another one begins that is not kept.
+    pub fn structure(&self) -> Structure {
+        let histories = self.begins.iter().map(|one| one.history);
+        Structure {
+            records: histories.zip(self.drifts.iter().copied()).collect(),
+            creep_times: self.times.clone(),
+            dynamics: self.dynamics(),
+            kept: false,
+        }
     }
 
     /// That a simulation was stopped.

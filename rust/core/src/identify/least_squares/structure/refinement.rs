@@ -29,7 +29,7 @@ pub(super) const FIRST_ROUNDS: usize = 1;
 const UNSEEN: f64 = 1e-6;
 
 /// Least gain of a move: less is chance, and the structure of the moves before stays.
-const LEAST_GAIN: f64 = 3e-3;
+pub(super) const LEAST_GAIN: f64 = 3e-3;
 
 /// Least gain of a drift or a lag in place of creep or the other way round: one explains a record as
 /// well as the other, but goes on otherwise, and which of them foretells a part has been found

@@ -6,7 +6,7 @@ use super::histories::{fitted_history, history_gain, with_history};
 use super::lag::{best_lag, relaxes_as_well, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::nodes::{add_once, choose_nodes, drop_once, few_or_many, spread};
-use super::refinement::{FIRST_ROUNDS, ROUNDS, Refinement};
+use super::refinement::{FIRST_ROUNDS, LEAST_GAIN, ROUNDS, Refinement};
 use super::slow_parts::{choose_slow, creeps, drop_drifts, without_creep};
 use super::trials::{side_by_side, with_each};
 use crate::identify::least_squares::common::Common;
@@ -44,6 +44,10 @@ const ROWS_OF_LEVELS: usize = 4000;
 
 /// Starts of one history each that are refined: those of least cost.
 const REFINED: usize = 2;
+
+/// Fits anew from the structure that was found, at most: weights and dead zones may stand where
+/// they suited another one.
+const ANEW: usize = 3;
 
 /// The best stage; `None` where stopped.
 pub(in crate::identify::least_squares) fn search<'a>(
@@ -83,7 +87,9 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         NodesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
     };
     let mut fit = Fit::new(common, &nodes);
-    let every = |one: &WeightsRecord<'_>| one.samples().div_ceil(rows_of(common));
+    let every = |one: &WeightsRecord<'_>| {
+        if one.jumps() { 1 } else { one.samples().div_ceil(rows_of(common)) }
+    };
     fit.every = common.records.iter().map(every).collect();
     fit.settle(ROUGH)?;
     if settings.start.is_none() {
@@ -104,6 +110,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         fit.settle(ROUGH)?;
     }
     let refinement = Refinement { settings, shown: mode };
+    let first = fit.clone();
     let open = fit.common.records.len() == 1 && fit.common.records[0].history.is_none();
     let each = [History::Virgin, History::Settled, History::Fitted].map(Some);
     let starts = if open { each.to_vec() } else { vec![None] };
@@ -124,6 +131,13 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     drop_once(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
+    for _ in 0..ANEW {
+        let anew = resumed(first.clone(), settings, &fit.structure())?;
+        if refinement.cost(&anew) > refinement.cost(&fit) - LEAST_GAIN {
+            break;
+        }
+        fit = anew;
+    }
     with_range_of_lags(fit, settings)
 }
 
