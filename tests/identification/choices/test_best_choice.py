@@ -36,7 +36,7 @@ def ratio(choices: Any, seed: int) -> float:
     return float(default / min(default, *(choices.cost(data, named) for named in choices.NAMED)))
 
 
-@pytest.mark.parametrize("seed", [2, 5, 18])
+@pytest.mark.parametrize("seed", [2, 5, 18, 35, 44])
 def test_no_choice_named_is_better_than_the_default(seed: int) -> None:
     assert ratio(bench(), seed) < 1.03
 

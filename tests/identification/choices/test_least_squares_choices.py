@@ -138,6 +138,13 @@ def test_choices_on_a_thinned_record_are_those_of_the_whole() -> None:
     assert many.rms < 15e-9
 
 
+def test_least_squares_end_where_they_are_to_stop() -> None:
+    t = np.arange(100_000) / 1e4
+    u = 37.5 - 30.0 * np.cos(2.0 * np.pi * 1.3 * t)
+    with pytest.raises(KeyboardInterrupt):
+        fitted(u, noisy(PLAIN.simulate(u, t[1]).x), dt=t[1], stopped=lambda: True)
+
+
 def test_a_slow_record_shows_no_mode() -> None:
     u = drive()
     for stage in (MODE, replace(PLAIN, creep_weights=(0.01, 0.01), creep_times=(0.1, 1.0))):

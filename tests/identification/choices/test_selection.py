@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import time
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ import pytest
 import piezotrack as pt
 from piezotrack._support.statistics import sample_noise
 from piezotrack.identification.fitted.selection import Trial
+from piezotrack.identification.solve import selection
+from piezotrack.identification.solve.one_model import identify_model
 from records import selection_of
 
 DT = 1e-3
@@ -48,6 +51,41 @@ def test_plays_are_found_without_a_search() -> None:
     assert selection_of(fit).fitted_until is not None
     until = selection_of(fit).fitted_until
     assert f"{until:.4g} s, by their rms after it:" in fit.summary()
+
+
+def test_trials_in_threads_are_those_one_after_the_other() -> None:
+    data = record(SMOOTH, 2e-9)
+    method = pt.Descents(seed=1, runs=2)
+    one, two = (pt.identify(data, method=method, threads=count) for count in (1, 2))
+    assert [(trial.model, trial.rms) for trial in selection_of(one).trials] == [
+        (trial.model, trial.rms) for trial in selection_of(two).trials
+    ]
+    assert one.cost == two.cost
+
+
+def test_ctrl_c_ends_trials_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[str] = []
+
+    def until_stopped(problem: Any, method: Any, run: Any, *rest: Any) -> Any:
+        if run.stopped is None:
+            return identify_model(problem, method, run, *rest)
+        while not run.stopped():
+            time.sleep(0.01)
+        ended.append(problem.model)
+        raise pt.Interrupted("interrupted")
+
+    def interrupt(_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(selection, "identify_model", until_stopped)
+    monkeypatch.setattr(selection, "waited_for", interrupt)
+    with pytest.raises(pt.Interrupted, match="before the weights were found"):
+        pt.identify(record(SMOOTH, 2e-9))
+    waited = time.monotonic()
+    while len(ended) < 2 and time.monotonic() < waited + 10.0:
+        time.sleep(0.01)
+    # Two had begun, the others do not begin any more.
+    assert len(ended) == 2
 
 
 def test_smooth_tips_are_told_from_plays(tmp_path: Path) -> None:

@@ -355,15 +355,19 @@ def changes(
         Change with each value, in the unit of the value [m/...]; 0 where there is no such stage
         beside it.
     """
+    still = motion(model)
 
     def change(value: Value) -> Array:
         share = FROM_ZERO if value.of(model) == 0.0 else STEP
         size = LATER * dt if value.parameter == DELAY else share * _size(model, value)
-        for ways in ((1.0, -1.0), (1.0, 0.0), (0.0, -1.0)):
-            up, down = (moved(model, [value], np.array([size * way])) for way in ways)
-            if up is not None and down is not None:
-                return (motion(up) - motion(down)) / (size * (ways[0] - ways[1]))
-        return np.zeros_like(motion(model))
+        # The motion is linear in each weight but for the few samples at the edge of a dead zone.
+        both_sides = [] if value.parameter.endswith("weights") else [(1.0, -1.0)]
+        for ways in (*both_sides, (1.0, 0.0), (0.0, -1.0)):
+            ends = [moved(model, [value], np.array([size * way])) if way else model for way in ways]
+            moves = [still if end is model else motion(end) for end in ends if end is not None]
+            if len(moves) == 2:
+                return (moves[0] - moves[1]) / (size * (ways[0] - ways[1]))
+        return np.zeros_like(still)
 
     with two_threads() as pool:
         return np.array(list(one_by_one(pool, change, values)))

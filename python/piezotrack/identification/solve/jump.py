@@ -11,6 +11,8 @@ from ...errors import ParameterError
 from ..fitted.model_entries import origin_of, provenance
 from ..fitted.notes import carried_by_first_samples
 from ..fitted.start import GAIN, least_voltage, start_at_jump
+from ..methods.least_squares import LeastSquares
+from .weights import Structure
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
     from ...data.dataset import Dataset
     from ..fitted.identification import Identification
     from ..problem.problem import Problem
+
+    Identify = Callable[[Problem, Structure | None], Identification]
 
 __all__ = ["voltage_of_rest", "with_rest", "with_rest_tried"]
 
@@ -34,9 +38,7 @@ ALIKE, TRIED, APART = 1.1, 3, 1.5
 ROUNDS = 3
 
 
-def with_rest_tried(
-    problem: Problem, fit: Identification, identify: Callable[[Problem], Identification]
-) -> Identification:
+def with_rest_tried(problem: Problem, fit: Identification, identify: Identify) -> Identification:
     """Try that the stage was at rest before where the first samples carry the residual.
 
     Parameters
@@ -46,7 +48,7 @@ def with_rest_tried(
     fit : Identification
         Its result without a jump.
     identify : callable
-        What solves a problem.
+        What solves a problem, from a structure if one is given.
 
     Returns
     -------
@@ -71,9 +73,7 @@ def voltage_of_rest(fit: Identification) -> float | None:
     return start.voltage if start is not None and start.history == "rest" else None
 
 
-def with_rest(
-    problem: Problem, identify: Callable[[Problem], Identification], known: float | None = None
-) -> Identification:
+def with_rest(problem: Problem, identify: Identify, known: float | None = None) -> Identification:
     """Identify a stage that was at rest until the drive jumped to the first sample.
 
     At rest at a voltage, or at another one where that lowers the residual by 2 %.
@@ -83,7 +83,7 @@ def with_rest(
     problem : Problem
         The problem, of one record.
     identify : callable
-        What solves a problem.
+        What solves a problem, from a structure if one is given.
     known : float, optional
         Voltage of rest [V] that another fit has shown, about which it is searched; 0 V, and a
         grid where that is far off, without.
@@ -105,10 +105,11 @@ def with_rest(
     fit = _at_rest(problem, identify, 0.0 if known is None else known)
     if known is None and carried_by_first_samples(_left(fit, fit.data)):
         begun = _begun(problem)
+        start = Structure.of(fit) if isinstance(fit.method, LeastSquares) else None
         costs: dict[float, float] = {}
 
         def cost(volts: float) -> float:
-            costs[volts] = _at_rest(begun, identify, volts).cost
+            costs[volts] = _at_rest(begun, identify, volts, start).cost
             return costs[volts]
 
         least = costs[least_voltage(cost, _voltages(data), (COARSE, ABOUT))]
@@ -184,16 +185,16 @@ def _first(data: Dataset) -> Dataset:
 
 
 def _at_rest(
-    problem: Problem, identify: Callable[[Problem], Identification], volts: float
+    problem: Problem, identify: Identify, volts: float, start: Structure | None = None
 ) -> Identification:
     (record,) = problem.records
     data = record.data
     before = data._preceded(volts)
     begin = before.t[0] if data.warmup else before.full.t[2]
     preceded = replace(record, data=before[float(begin) :], history="virgin")
-    fit = identify(replace(problem, records=(preceded,)))
+    fit = identify(replace(problem, records=(preceded,)), start)
     judged = data if data.warmup else data[float(data.t[1]) :]
-    start = start_at_jump(fit.model, data, volts)
-    own = replace(fit.records[0], data=judged, start=start, origin=origin_of(judged))
+    at_jump = start_at_jump(fit.model, data, volts)
+    own = replace(fit.records[0], data=judged, start=at_jump, origin=origin_of(judged))
     known = {**fit.details, "provenance": {**fit.details["provenance"], **provenance(judged)}}
-    return replace(fit, data=judged, records=(own,), start=start, details=known)
+    return replace(fit, data=judged, records=(own,), start=at_jump, details=known)

@@ -72,8 +72,8 @@ def identify_model(
     """
 
     def identify(other: Problem, start: Structure | None, rest: float | None) -> Identification:
-        def plain(one: Problem) -> Identification:
-            return _identify(one, method, run, start)
+        def plain(one: Problem, begun: Structure | None = None) -> Identification:
+            return _identify(one, method, run, begun or start)
 
         if rest is not None or any(record.history == "rest" for record in other.records):
             return with_rest(other, plain, rest)

@@ -42,3 +42,23 @@ impl Thinned {
         sample.div_ceil(self.every)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{LONGEST_PHASE, thinning};
+    use crate::models::Measures;
+    use crate::signal::{Drive, Hold, index};
+
+    #[test]
+    fn a_slow_record_is_thinned_as_far_as_its_motion_allows() {
+        let (dt, rate) = (1e-3, core::f64::consts::PI);
+        let u: Vec<f64> =
+            (0..100_000).map(|k| 50.0 - 50.0 * libm::cos(rate * dt * index(k))).collect();
+        let drive = Drive { u: &u, dt, hold: Hold::First };
+        let of = Measures::of(&drive, &u, 0..u.len());
+        // So few rows that the phase between them would be ten times as long as allowed.
+        let every = thinning(&of, dt, u.len(), u.len() / 200);
+        assert!(rate * dt * index(every) < 1.01 * LONGEST_PHASE);
+        assert!(rate * dt * index(every + 1) > 0.99 * LONGEST_PHASE);
+    }
+}

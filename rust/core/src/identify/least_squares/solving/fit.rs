@@ -255,7 +255,9 @@ impl<'a> Fit<'a> {
     /// Remainder of a drift of 1 at sample `k` of a record that counts from `start` on.
     pub fn fading(&self, r: usize) -> impl Fn(usize, usize) -> f64 + use<> {
         let rate = self.drifts[r].map_or(0.0, |time| self.common.records[r].drive.dt / time);
-        move |k, start| libm::exp(rate * (index(start) - index(k)))
+        move |k, start| {
+            if rate == 0.0 { 1.0 } else { libm::exp(rate * (index(start) - index(k))) }
+        }
     }
 
     /// Sum of the weighted signals, m.

@@ -174,22 +174,20 @@ pub(super) fn choose_nodes(fit: &mut Fit<'_>, settings: &Settings) -> Option<()>
     let once = has_once(fit);
     let trials = |&(count, power): &(usize, f64)| {
         let mut trial = here.clone();
-        let thresholds = spread(trial.common, (count, power), once);
-        trial.restructure(|trial| trial.nodes = thresholds);
+        set_nodes(&mut trial, spread(here.common, (count, power), once));
         trial.settle_rigid(STEPS)?;
         let few = if count == MANY_PLAYS { gathered(&trial)? } else { None };
         let both = [Some(trial), few].into_iter().flatten();
-        Some(both.map(|trial| (foretold(&trial), trial.nodes)).collect::<Vec<_>>())
+        Some(both.map(|trial| (foretold(&trial), trial)).collect::<Vec<_>>())
     };
     let found: Option<Vec<_>> =
         on_all_threads(tried(fit.common.of.nodes()), &trials).into_iter().collect();
     let least = (1.0 - PLAYS_GAIN) * foretold(&here);
-    let mut better: Vec<(f64, Vec<f64>)> =
+    let mut better: Vec<(f64, Fit<'_>)> =
         found?.into_iter().flatten().filter(|(rms, _)| *rms < least).collect();
     better.sort_by(|one, other| one.0.total_cmp(&other.0));
-    for (_, nodes) in better {
-        let mut trial = fit.clone();
-        trial.restructure(|trial| trial.nodes = nodes);
+    for (_, mut trial) in better {
+        trial.windows.clone_from(&fit.windows);
         trial.settle(ROUGH)?;
         // What foretells the last third has to explain all of the window too.
         if trial.rms < SAME * fit.rms {
@@ -198,6 +196,32 @@ pub(super) fn choose_nodes(fit: &mut Fit<'_>, settings: &Settings) -> Option<()>
         }
     }
     Some(())
+}
+
+/// Gives a fit other nodes. The weight of each play goes to its neighbours among them, or all that
+/// depends on the weights would begin about a stage without plays.
+fn set_nodes(fit: &mut Fit<'_>, nodes: Vec<f64>) {
+    let before = (fit.nodes.clone(), fit.x[fit.layout().weights()].to_vec());
+    fit.restructure(|fit| fit.nodes = nodes);
+    let single = |weights: usize, nodes: &[f64]| weights == nodes.len() + 1;
+    let weights = &before.1;
+    if fit.common.of.nodes() != Nodes::Thresholds
+        || !single(weights.len(), &before.0)
+        || !single(fit.layout().weights, &fit.nodes)
+    {
+        return;
+    }
+    // What passes without a play is one of threshold 0.
+    fit.x[0] = weights[0];
+    for (at, weight) in before.0.iter().zip(&weights[1..]) {
+        let above = fit.nodes.partition_point(|node| node <= at);
+        let low = if above == 0 { 0.0 } else { fit.nodes[above - 1] };
+        let share = fit.nodes.get(above).map_or(0.0, |high| (at - low) / (high - low));
+        fit.x[above] += (1.0 - share) * weight;
+        if share > 0.0 {
+            fit.x[above + 1] += share * weight;
+        }
+    }
 }
 
 /// Few plays in place of many that are spread evenly, where their weights gather about few
@@ -219,11 +243,11 @@ fn gathered<'a>(fit: &Fit<'a>) -> Option<Option<Fit<'a>>> {
         let mut pairs: Vec<f64> =
             middle.iter().flat_map(|at| [f64::max(at - 0.5 * gap, 0.0), at + 0.5 * gap]).collect();
         pairs.sort_by(f64::total_cmp);
-        trial.restructure(|trial| trial.nodes = pairs);
+        set_nodes(&mut trial, pairs);
         trial.settle_rigid(STEPS)?;
     }
     let middle = middles(&trial, 1.1 * gap);
-    trial.restructure(|trial| trial.nodes = middle);
+    set_nodes(&mut trial, middle);
     trial.settle_rigid(STEPS)?;
     Some(Some(trial))
 }

@@ -3,7 +3,7 @@
 //! Each is decided in turn on the least squares so far, and has to earn its place.
 
 use super::histories::{fitted_history, history_gain, with_history};
-use super::lag::{best_lag, relaxes_as_well, smallest_lag};
+use super::lag::{best_lag, lag_gain, relaxes_as_well, smallest_lag};
 use super::modes::{drop_modes, first_mode};
 use super::nodes::{add_once, choose_nodes, drop_once, few_or_many, spread};
 use super::refinement::{FIRST_ROUNDS, LEAST_GAIN, ROUNDS, Refinement};
@@ -131,6 +131,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     drop_once(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
+    add_unseen_mode(&mut fit, settings)?;
     for _ in 0..ANEW {
         let anew = resumed(first.clone(), settings, &fit.structure())?;
         if refinement.cost(&anew) > refinement.cost(&fit) - LEAST_GAIN {
@@ -376,8 +377,7 @@ fn choose_dynamics_and_creep(fit: &mut Fit<'_>, settings: &Settings, mode: bool)
     Some(())
 }
 
-/// Mode or lag where they are not set; the lags that explain the record as well are then in
-/// [`Fit::lags`].
+/// Mode or lag where they are not set.
 fn choose_dynamics(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option<()> {
     match settings.dynamics {
         DynamicsKind::None => {}
@@ -386,22 +386,30 @@ fn choose_dynamics(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option
         DynamicsKind::Second => *fit = unseen_mode(fit)?,
         DynamicsKind::Auto => {
             let mut still = fit.clone();
-            if mode {
-                still.set_poles(Form::None, &[]);
-                still.settle(ROUGH)?;
-                let lagging = best_lag(&still)?;
-                if fit.rms >= (1.0 - MODE_GAIN) * lagging.rms {
-                    *fit = smallest_lag(still, &lagging)?;
-                }
+            still.set_poles(Form::None, &[]);
+            still.settle(ROUGH)?;
+            let lagging = best_lag(&still)?;
+            if mode && fit.rms < (1.0 - MODE_GAIN) * lagging.rms {
                 return Some(());
             }
-            let [lagging, hidden] = side_by_side([&|| best_lag(&still), &|| unseen_mode(&still)])?;
-            if is_mode(&hidden) && hidden.rms < (1.0 - UNSEEN_GAIN) * lagging.rms {
-                *fit = hidden;
-            } else {
-                *fit = smallest_lag(still, &lagging)?;
-            }
+            let lags = lagging.rms < (1.0 - lag_gain(&still)) * still.rms;
+            *fit = if lags { lagging } else { still };
         }
+    }
+    Some(())
+}
+
+/// Takes a mode that no record shows where it explains clearly more than all else.
+fn add_unseen_mode(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
+    if settings.dynamics != DynamicsKind::Auto || matches!(fit.form, Form::Modes(_)) {
+        return Some(());
+    }
+    let mut still = fit.clone();
+    still.set_poles(Form::None, &[]);
+    still.settle(ROUGH)?;
+    let hidden = unseen_mode(&still)?;
+    if is_mode(&hidden) && hidden.rms < (1.0 - UNSEEN_GAIN) * fit.rms {
+        *fit = hidden;
     }
     Some(())
 }
