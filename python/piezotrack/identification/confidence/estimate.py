@@ -13,8 +13,8 @@ import numpy as np
 from ... import _core
 from ...errors import DataError, PiezotrackError
 from ..fitted.certainty.covariance import Covariance, NoiseShares, is_hidden
+from ..solve.judging import SAME_PERIOD, period_of
 from ..solve.search import details_of
-from ..solve.selection import SAME_PERIOD, period_of
 from .held_out import held_out
 from .sensitivity import DELAY, Value, fitted_values, gradient, sensitivity, sizes_of
 

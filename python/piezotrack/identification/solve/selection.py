@@ -6,20 +6,18 @@ import math
 import time
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from threading import Event
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ... import _core
 from ..._support.display.progress_parts import Parts
-from ..._support.statistics import sample_noise
 from ..._support.two_threads import two_threads, waited_for
 from ...errors import DataError, NumericalError
 from ...stages.registry import model_named
 from ..fitted.selection import Selection, Trial
 from ..methods.least_squares import LeastSquares
+from .judging import is_white, judged, noise_of, period_of, two_parts
 from .jump import voltage_of_rest
 from .one_model import identify_model, weights_of
 from .weights import Structure
@@ -39,7 +37,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["identify_best", "is_white", "models_tried", "period_of", "two_parts"]
+__all__ = ["identify_best", "models_tried"]
 
 # Models whose weights follow by least squares, the simpler first; and models that are searched.
 LEAST_SQUARES = (
@@ -56,20 +54,12 @@ SEARCHED = ("first-order-dahl", "parallel-dahl", "bouc-wen")
 CONTAINED = {"parallel-dahl": "first-order-dahl"}
 NEAR_BEST = 1.5
 OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
-# Share of the window that is fitted, and turns of the drive that each part needs; and the share
-# where it turns too seldom.
-FITTED, TURNS, FITTED_OF_ONE_LOOP = 0.6, 2, 0.75
-# Fewer samples are not parted.
-LEAST_SAMPLES = 100
 # A residual of so many times the noise, on what was not fitted, is good enough to try no more; one
 # of so many times is good enough to search none.
 AS_NOISE, NEAR_NOISE = 1.5, 2.0
 # A fit to the whole records that leaves so many times the noise is not made anew; one to their
 # first parts has a right structure, beside which none is searched.
 NOTHING_BUT_NOISE = 1.2
-# Correlation of residuals up to so many samples apart that is that of noise; and what chance makes
-# of it, in standard deviations.
-APART, CORRELATED, CHANCE = 10, 0.1, 4.0
 # Another model has to be better by this share than one before it in the list; where the record
 # has one loop, on which all are judged that were fitted to it, by more.
 BETTER, BETTER_ON_ONE_LOOP = 0.03, 0.1
@@ -77,10 +67,6 @@ BETTER, BETTER_ON_ONE_LOOP = 0.03, 0.1
 # on what was not fitted, that leaves less by this share there; or to one of many weights, which a
 # drive that repeats does not determine. One of many weights has to leave less than others by it.
 OTHERS, BETTER_ON_WHOLE, MANY_WEIGHTS = 3, 0.25, "preisach"
-# Blocks of the drive that differ by this ratio in amplitude or rate are judged apart.
-APART_IN_SIZE = 2.0
-# A drive repeats where periods of it differ by less than this share.
-SAME_PERIOD = 0.01
 # Time that a search takes beside that of least squares, for the progress.
 SLOWER = 5.0
 
@@ -310,102 +296,6 @@ def _with_delays(problem: Problem, shown: list[bool]) -> Problem:
     return replace(problem, records=records)
 
 
-def noise_of(data: Dataset) -> float:
-    """Return what no model explains [m]: noise between samples, or what does not repeat."""
-    return max(sample_noise(data.y), repeated(data))
-
-
-def judged(data: Dataset, left: Array) -> float:
-    """Return the mean square of a residual [m^2], each amplitude and rate of the drive alike.
-
-    Parameters
-    ----------
-    data : Dataset
-        The record, of n samples.
-    left : ndarray, shape (n,)
-        The residual [m].
-
-    Returns
-    -------
-    float
-        Mean over the classes of blocks, between reversals, that differ in amplitude or rate.
-    """
-    left, data = data.at_readings(left), data.measured
-    turns = _core.turns(data.u, 0.05 * float(np.ptp(data.u)))
-    # Parts of blocks at the ends differ in amplitude by chance.
-    blocks = [slice(a, b) for a, b in pairwise(turns)]
-    if len(blocks) < 2:
-        return float(np.mean(data.counted(left) ** 2))
-    if data.left_out is not None:
-        left = np.where(data.left_out, np.nan, left)
-    size = np.array([np.ptp(data.u[block]) for block in blocks])
-    rate = size / np.array([block.stop - block.start for block in blocks])
-    classes: dict[tuple[bool, bool], list[slice]] = {}
-    for block, large, fast in zip(blocks, _upper(size), _upper(rate), strict=True):
-        classes.setdefault((bool(large), bool(fast)), []).append(block)
-    means = [
-        np.nanmean(np.concatenate([left[one] for one in some]) ** 2) for some in classes.values()
-    ]
-    return float(np.mean(means))
-
-
-def _upper(values: Array) -> NDArray[np.bool_]:
-    """Return which values are in the upper class; none where all are alike."""
-    low, high = float(np.min(values)), float(np.max(values))
-    if high <= APART_IN_SIZE * low:
-        return np.zeros(values.size, dtype=np.bool_)
-    return values > math.sqrt(max(low, 1e-12 * high) * high)
-
-
-def repeated(data: Dataset) -> float:
-    """Return what of a displacement does not repeat with a periodic drive, rms [m]; else 0.
-
-    No model of the drive explains more than what repeats.
-
-    Parameters
-    ----------
-    data : Dataset
-        The record.
-
-    Returns
-    -------
-    float
-        Standard deviation of the difference between periods, over the root of 2.
-    """
-    period = period_of(data)
-    if period is None:
-        return 0.0
-    return float(np.std(data.y[period:] - data.y[:-period])) / math.sqrt(2.0)
-
-
-def period_of(data: Dataset) -> int | None:
-    """Return the period of a drive that repeats.
-
-    Parameters
-    ----------
-    data : Dataset
-        The record.
-
-    Returns
-    -------
-    int or None
-        In samples; None where the drive does not repeat within the window.
-    """
-    u = data.u - data.u.mean()
-    turns = np.array(_core.turns(data.u, 0.5 * float(np.ptp(data.u))), dtype=np.intp)
-    if turns.size < 4:
-        return None
-    period = round(float(np.median(turns[2:] - turns[:-2])))
-    near = [p for p in (period - 1, period, period + 1) if 8 <= p <= u.size // 2]
-    if not near:
-        return None
-    gap = {p: float(np.std(u[p:] - u[:-p])) for p in near}
-    best = min(gap, key=gap.__getitem__)
-    if gap[best] > SAME_PERIOD * float(np.std(u)):
-        return None
-    return best
-
-
 def best_of(tried: Sequence[Tried], better: float = BETTER) -> Tried:
     """Return the best trial, or one before it in the list that is hardly worse.
 
@@ -472,51 +362,3 @@ def models_tried(data: Dataset, parameters: Mapping[str, object]) -> list[ModelI
     names = OF_FORCE if data.drive_unit == "N" else (*LEAST_SQUARES, *SEARCHED)
     infos = [model_named(name) for name in names]
     return [info for info in infos if info.searched or not parameters]
-
-
-def two_parts(data: Dataset) -> tuple[Dataset, Dataset, bool]:
-    """Part a record for trials.
-
-    Parameters
-    ----------
-    data : Dataset
-        The record.
-
-    Returns
-    -------
-    part, rest : Dataset
-        To fit, and to judge on: the last quarter where the drive turns too seldom.
-    few : bool
-        Whether it does.
-    """
-    turns = np.array(_core.turns(data.u, 0.2 * float(np.ptp(data.u))), dtype=np.intp)
-    for place in turns[np.argsort(np.abs(turns - FITTED * len(data)))]:
-        before, after = int(np.sum(turns < place)), int(np.sum(turns >= place))
-        if before >= TURNS and after >= TURNS:
-            middle = float(data.t[place])
-            return data[data.t[0] : middle], data[middle:], False
-    if len(data) < LEAST_SAMPLES:
-        return data, data, True
-    middle = float(data.t[int(FITTED_OF_ONE_LOOP * (len(data) - 1))])
-    return data[data.t[0] : middle], data[middle:], True
-
-
-def is_white(rest: Array) -> bool:
-    """Return whether residuals are noise from sample to sample: nothing is left to describe.
-
-    Parameters
-    ----------
-    rest : ndarray, shape (n,)
-        The residuals [m].
-
-    Returns
-    -------
-    bool
-        Whether no correlation is left.
-    """
-    rest = rest - rest.mean()
-    squares = float(rest @ rest)
-    if rest.size <= APART or squares == 0.0:
-        return True
-    most = max(abs(float(rest[:-k] @ rest[k:])) for k in range(1, APART + 1))
-    return most < max(CORRELATED, CHANCE / math.sqrt(rest.size)) * squares
