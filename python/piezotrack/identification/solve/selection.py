@@ -202,7 +202,13 @@ class _Trials:
     def whole(self, problem: Problem, info: ModelInfo) -> Problem:
         """Return the problem of a model on the whole records, with the delays that were shown."""
         shown = any(self.delayed) and not info.searched
-        return (_with_delays(problem, self.delayed) if shown else problem).of_model(info)
+        return self.of_model(_with_delays(problem, self.delayed) if shown else problem, info)
+
+    def of_model(self, problem: Problem, info: ModelInfo) -> Problem:
+        """Return the problem of a model; one that is searched creeps as least squares have shown."""
+        if info.searched and problem.creep is None and self.start and self.start.creep_times:
+            problem = replace(problem, creep=tuple(self.start.creep_times))
+        return problem.of_model(info)
 
     def others(self, best: Tried) -> list[Tried]:
         """Return the models that are fitted to the whole records beside the best one."""
@@ -274,7 +280,7 @@ class _Trials:
     def attempt(self, info: ModelInfo, how: Run) -> _Attempt | DataError | NumericalError:
         """Fit a model to the first parts, and say what it leaves of the rests."""
         begun = time.perf_counter()
-        problem, method = self.problem.of_model(info), self.methods.method(info)
+        problem, method = self.of_model(self.problem, info), self.methods.method(info)
         try:
             fit = identify_model(problem, method, how, self.start, self.rest)
             left = [

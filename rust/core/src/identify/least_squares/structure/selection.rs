@@ -131,7 +131,6 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     drop_once(&mut fit, settings)?;
     drop_drifts(&mut fit)?;
     replace_corners(&mut fit)?;
-    add_unseen_mode(&mut fit, settings)?;
     for _ in 0..ANEW {
         let anew = resumed(first.clone(), settings, &fit.structure())?;
         if refinement.cost(&anew) > refinement.cost(&fit) - LEAST_GAIN {
@@ -389,27 +388,17 @@ fn choose_dynamics(fit: &mut Fit<'_>, settings: &Settings, mode: bool) -> Option
             still.set_poles(Form::None, &[]);
             still.settle(ROUGH)?;
             let lagging = best_lag(&still)?;
-            if mode && fit.rms < (1.0 - MODE_GAIN) * lagging.rms {
-                return Some(());
-            }
+            let (found, gain) =
+                if mode { (fit.clone(), MODE_GAIN) } else { (unseen_mode(&still)?, UNSEEN_GAIN) };
             let lags = lagging.rms < (1.0 - lag_gain(&still)) * still.rms;
-            *fit = if lags { lagging } else { still };
+            *fit = if (mode || is_mode(&found)) && found.rms < (1.0 - gain) * lagging.rms {
+                found
+            } else if lags {
+                lagging
+            } else {
+                still
+            };
         }
-    }
-    Some(())
-}
-
-/// Takes a mode that no record shows where it explains clearly more than all else.
-fn add_unseen_mode(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
-    if settings.dynamics != DynamicsKind::Auto || matches!(fit.form, Form::Modes(_)) {
-        return Some(());
-    }
-    let mut still = fit.clone();
-    still.set_poles(Form::None, &[]);
-    still.settle(ROUGH)?;
-    let hidden = unseen_mode(&still)?;
-    if is_mode(&hidden) && hidden.rms < (1.0 - UNSEEN_GAIN) * fit.rms {
-        *fit = hidden;
     }
     Some(())
 }
