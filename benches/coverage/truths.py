@@ -226,7 +226,7 @@ def searched() -> dict[str, Case]:
     paper = pt.DahlStage.xu_li_2010()
     return {
         "Dahl": Case("dahl", dahl, held(stiffness=dahl.stiffness, mass=dahl.mass)),
-        "Dahl, mass not shown": Case("dahl", dahl, held(stiffness=dahl.stiffness), irregular=True),
+        "Dahl, mass not shown": Case("dahl", dahl, held(stiffness=dahl.stiffness)),
         "Dahl of the paper": Case(
             "dahl", paper, held(stiffness=paper.stiffness, mass=paper.mass), irregular=True
         ),

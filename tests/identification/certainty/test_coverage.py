@@ -76,6 +76,17 @@ def test_intervals_cover_with_every_model_and_noise(case: str, noise: str) -> No
     assert SHORT.get((case, noise), LEAST) - ERROR < covered < MOST + ERROR
 
 
+def test_intervals_allow_for_a_mass_that_the_record_does_not_show() -> None:
+    """Held at 0, it is made up for by damping and gain, by two and three deviations."""
+    values = CELLS.measured("Dahl, mass not shown", "white", 20)["values"]
+    assert "mass" not in values
+    for name in ("damping", "piezo_coefficient"):
+        assert values[name]["covered"] > 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / 20)
+        assert values[name]["independent"] < 0.75
+        # Of a mass of one deviation of its own, the fit without it is biased by `bias`.
+        assert 1.0 < values[name]["ratio"] / abs(values[name]["bias"]) < 2.0
+
+
 def test_deviations_of_what_follows_from_other_values_are_those_of_the_estimates() -> None:
     # Thresholds of the drive stay, and the displacements at which elements slip follow.
     values = CELLS.measured("Maxwell slip", "white", 30)["values"]

@@ -16,7 +16,16 @@ from ..fitted.certainty.covariance import Covariance, NoiseShares, is_hidden
 from ..solve.judging import SAME_PERIOD, period_of
 from ..solve.search import details_of
 from .held_out import held_out
-from .sensitivity import DELAY, Value, fitted_values, gradient, sensitivity, sizes_of
+from .sensitivity import (
+    DELAY,
+    LinearisedRecord,
+    Value,
+    fitted_values,
+    gradient,
+    moved,
+    sensitivity,
+    sizes_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -42,6 +51,8 @@ MOST, MOST_RESAMPLED = 2**16, 2**12
 DRAWS, SEED = 199, 1
 # Level at which intervals are widened, and fewest whole periods that tell noise from model error.
 LEVEL, PERIODS = 0.95, 3
+# Deviations of a held mass beyond which it is what the model lacks: a search takes a mass that is.
+MOST_HELD = 5.0
 
 
 def with_covariance(fit: Identification) -> Identification:
@@ -255,12 +266,45 @@ def _covariance(
         widening=np.maximum(quantiles / NormalDist().inv_cdf(0.5 + 0.5 * LEVEL), 1.0),
         shifts=np.array(shifts) * sizes[:, None],
         to_least_cost=sizes * (np.array(steps) if aside else 0.0),
+        by_mass=_by_mass(model, records, at, sizes, np.array(steps)),
         samples=sum(record.samples for record in linear),
         orders=tuple(orders),
         hidden=np.array(hidden).reshape(-1, sizes.size) * sizes,
         predicted=held_out(model, records, at).quantile(LEVEL),
         shares=linear[0].shares,
     )
+
+
+def _by_mass(
+    model: IdentifiedModel, records: Records, at: list[Sensitivity], sizes: Array, steps: Array
+) -> Array:
+    """Return `Covariance.by_mass`: 0 where no mass was held."""
+    none, mass = np.zeros((steps.size, 2)), getattr(model, "parameters", {}).get("mass")
+    if mass is None or mass.free or mass.deviation is None:
+        return none
+    # The step of `sensitivity`, in a mass without effect, is one of rounding.
+    twice = moved(model, [Value("mass")], np.array([mass.value]))
+    if twice is None:
+        return none
+    known = [LinearisedRecord(model, data) for data, _ in records]
+    extended = [
+        _Linear(
+            replace(one, columns=np.vstack([one.columns, of.begun(twice) - of.begun(model)])),
+            data,
+            weight,
+            np.append(sizes, 1.0),
+        )
+        for one, of, (data, weight) in zip(at, known, records, strict=True)
+    ]
+    precision = np.append(_precision(model, fitted_values(model)) * sizes**2, 0.0)
+    matrix, determined, _, _, found, *_ = _core.linearised_covariance(
+        [record.thinned(MOST) for record in extended], np.diag(precision).tolist(), 0, SEED
+    )
+    if not determined[-1] or found[-1] == 0.0:
+        return none
+    ratio = found[-1] / math.sqrt(matrix[-1][-1])
+    changes = sizes * (np.array(found[:-1]) - steps)
+    return np.outer(changes / ratio, [min(ratio, MOST_HELD), 1.0])
 
 
 def _precision(model: IdentifiedModel, values: list[Value]) -> Array:

@@ -387,6 +387,8 @@ def parameter_notes(fit: Identification, name: str) -> str:
     if estimate.at_bound:
         on = any(one.active and name in (one.lower, one.upper) for one in fit.constraints)
         notes.append("on a constraint" if on else "on a bound")
+    if not estimate.free and estimate.deviation == math.inf and fit.covariance is not None:
+        notes.append("intervals allow for it")
     if fit.search and name in fit.search.scales:
         notes.append(f"{fit.search.scales[name]} scale")
     if estimate.tie is not None:

@@ -44,7 +44,10 @@ LISTS = (
     "widening",
     "shifts",
     "to_least_cost",
+    "by_mass",
 )
+# Those of them with two entries for each value.
+PAIRS = ("shifts", "by_mass")
 
 
 class Interval(NamedTuple):
@@ -113,6 +116,11 @@ class Covariance:
     to_least_cost : ndarray, shape (p,)
         Change of each value to where the cost is least, which an interval includes: not 0 where the
         fit has the shortest lag that fits as well (`Identification.lags`).
+    by_mass : ndarray, shape (p, 2)
+        What a mass that was held, as the records do not show it, would change each value by: the
+        mass of least cost, of five standard deviations at most, and one standard deviation. An
+        interval reaches as far as that of the fit with this mass, on the side to which a mass moves
+        the value. 0 where none was held.
     samples : int
         Samples of the records.
     orders : tuple of int
@@ -153,6 +161,7 @@ class Covariance:
     widening: Array
     shifts: Array
     to_least_cost: Array
+    by_mass: Array
     samples: int
     orders: tuple[int, ...]
     hidden: Array
@@ -161,8 +170,15 @@ class Covariance:
 
     @property
     def deviations(self) -> Array:
-        """Standard deviations, SI, shape (p,); infinite where a value is not determined."""
-        return np.where(self.determined, np.sqrt(np.diag(self.matrix)), np.inf)
+        """Standard deviations, SI, shape (p,); infinite where a value is not determined.
+
+        With what a mass leaves open that was held (`by_mass`), which the matrix has not.
+        """
+        moved, spread = self.by_mass.T
+        # Root mean square of what a mass above 0 moves, within a tenth.
+        by_mass = 0.5 * (np.hypot(moved, 2.0 * spread) + moved * np.sign(spread))
+        own = np.sqrt(np.diag(self.matrix))
+        return np.where(self.determined, np.hypot(own, by_mass), np.inf)
 
     @property
     def effective_samples(self) -> Array:
@@ -236,9 +252,13 @@ class Covariance:
             There is no such value, or `level` is no share.
         """
         place = self._place(name)
-        reach = float(self.widening[place] * normal_reach(level) * self.deviations[place])
-        ends = float(self.values[place]) + np.array([0.0, self.to_least_cost[place]])
-        return Interval(float(ends.min()) - reach, float(ends.max()) + reach)
+        if not self.determined[place]:
+            return Interval(-math.inf, math.inf)
+        normal = float(self.widening[place] * normal_reach(level))
+        own = math.sqrt(self.matrix[place, place])
+        further = _further(normal, own, *self.by_mass[place])
+        ends = float(self.values[place]) + np.array([0.0, self.to_least_cost[place], further])
+        return Interval(float(ends.min()) - normal * own, float(ends.max()) + normal * own)
 
     def reach(self, gradient: Array, level: float = 0.95) -> float:
         """Return half of the interval of a quantity that follows from the values.
@@ -269,7 +289,9 @@ class Covariance:
             whole = float(variances.sum())
             widening = float(variances @ self.widening) / whole if whole > 0.0 else 1.0
             deviation = math.sqrt(max(float(gradient @ self.matrix @ gradient), 0.0))
-            reach = normal * widening * deviation + abs(float(gradient @ self.to_least_cost))
+            further = _further(normal * widening, deviation, *(gradient @ self.by_mass))
+            reach = normal * widening * deviation
+            reach += max(abs(float(gradient @ self.to_least_cost)), abs(further))
         return reach if math.isfinite(reach) else math.inf
 
     def spread(self, gradients: Array) -> Array:
@@ -292,6 +314,12 @@ class Covariance:
         if name not in self.names:
             raise ParameterError("name", quoted(name), f"one of {', '.join(self.names)}")
         return self.names.index(name)
+
+
+def _further(normal: float, deviation: float, moved: float, spread: float) -> float:
+    """How much further an interval reaches with a mass, to the side to which it moves a value."""
+    more = moved * math.copysign(1.0, spread) + normal * (math.hypot(deviation, spread) - deviation)
+    return math.copysign(max(more, 0.0), spread)
 
 
 def is_hidden(hidden: Array, gradient: Array) -> bool:
@@ -403,8 +431,10 @@ def covariance_of_file(entry: Any, known: Collection[str]) -> Covariance | None:
         matrix[i, : i + 1] = matrix[: i + 1, i] = _numbers("matrix", row, (i + 1,))
     if np.diag(matrix).min() < 0.0:
         raise ParameterError("covariance: matrix", "a variance below 0", "0 or above", verb="has")
+    # Older files have nothing of a mass.
+    given = {"by_mass": [[0.0, 0.0]] * count} | found
     lists = {
-        name: _numbers(name, found[name], (count, 2) if name == "shifts" else (count,))
+        name: _numbers(name, given[name], (count, 2) if name in PAIRS else (count,))
         for name in LISTS
     }
     shares = {
