@@ -104,7 +104,7 @@ def test_a_model_that_fits_the_whole_record_far_better_is_taken(
 
 
 def test_a_searched_model_creeps_as_least_squares_have_shown(cases: Any) -> None:
-    # A Bouc-Wen stage that creeps, under a biased sine with a drift; plays leave 1.3 times the noise.
+    # A Bouc-Wen stage that creeps, under a biased sine; plays leave 1.3 times the noise.
     case = cases.make(1, 16)
     fit: Any = pt.identify(pt.Dataset(u=case.u, y=case.y, dt=case.dt))
     assert fit.model.info.name == "bouc-wen"

@@ -205,7 +205,7 @@ class _Trials:
         return self.of_model(_with_delays(problem, self.delayed) if shown else problem, info)
 
     def of_model(self, problem: Problem, info: ModelInfo) -> Problem:
-        """Return the problem of a model; one that is searched creeps as least squares have shown."""
+        """Return the problem of a model; searched ones creep as least squares have shown."""
         if info.searched and problem.creep is None and self.start and self.start.creep_times:
             problem = replace(problem, creep=tuple(self.start.creep_times))
         return problem.of_model(info)
