@@ -124,9 +124,11 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
 
     def whole(one: Tried, start: Structure | None) -> Identification:
         """Fit a model to the whole records, from the structure of their first parts or anew."""
-        kept = None if start is None else replace(start, kept=True)
+        kept, rest = None, None
+        if start is not None:
+            kept, rest = replace(start, kept=True), one.rest
         of_model = trials.whole(problem, one.info)
-        return identify_model(of_model, methods.method(one.info), run, kept, one.rest)
+        return identify_model(of_model, methods.method(one.info), run, kept, rest)
 
     with shares.begin(len(infos)):
         fit = whole(best, best.start)
