@@ -179,7 +179,7 @@ fn distinct(fits: Vec<Fit<'_>>) -> Vec<Fit<'_>> {
     kept
 }
 
-/// The structure from that of another model.
+/// The structure from that of another fit.
 fn resumed<'a>(mut fit: Fit<'a>, settings: &Settings, start: &Structure) -> Option<Fit<'a>> {
     let (form, poles) = Form::of(&start.dynamics);
     for (r, (history, drift)) in start.records.iter().enumerate().take(fit.begins.len()) {
