@@ -118,3 +118,22 @@ def test_the_exponent_is_that_of_the_least_cost() -> None:
     log = pt.Dataset(u=u, y=fit.data.y, dt=case.dt)
     true = pt.identify(log, "bouc-wen", history="virgin", parameters=held)
     assert fit.cost < 1.0005 * true.cost
+
+
+@pytest.mark.parametrize("noise", ["white", "AR 0.95"])
+def test_noise_alone_is_not_taken_for_an_error_of_the_model(noise: str) -> None:
+    """Least squares and generalised ones differ by what the noise alone makes of them."""
+    case = CELLS.CASES["plays"]
+    u = case.drive(1)
+    clean = CELLS.motion(case.truth(u), u, case.dt)
+    rng = np.random.default_rng(1)
+    differences = []
+    for _ in range(12):
+        certainty = case.fit(u, clean + CELLS.noise_of(noise, rng, u.size, case.noise)).covariance
+        assert certainty.decided_by_model == ()
+        moved, spread = certainty.shifts.T
+        differences.append(moved / spread)
+    # Of white noise both are nearly the same. 50 before, by the difference of both variances.
+    assert np.sqrt(np.mean(np.square(differences))) < 1.5
+    if noise != "white":
+        assert np.sqrt(np.mean(np.square(differences))) > 0.6

@@ -149,6 +149,19 @@ impl Autoregression {
         noise.windows(order + 1).map(of).collect()
     }
 
+    /// The adjoint of [`Self::innovations`]: as many values as the noise has samples.
+    pub(super) fn reversed_innovations(&self, values: &[f64]) -> Vec<f64> {
+        let order = self.coefficients.len();
+        let mut sums = vec![0.0; values.len() + order];
+        for (t, value) in values.iter().enumerate() {
+            sums[t + order] += value;
+            for (k, a) in self.coefficients.iter().enumerate() {
+                sums[t + order - 1 - k] -= a * value;
+            }
+        }
+        sums
+    }
+
     /// The noise that innovations make, less the first `leading` samples.
     pub(super) fn noise(&self, innovations: &[f64], leading: usize) -> Vec<f64> {
         let mut noise: Vec<f64> = Vec::with_capacity(innovations.len());

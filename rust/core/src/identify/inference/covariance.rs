@@ -93,20 +93,21 @@ pub fn covariance(
     let mut matrix = b * (precision * (variance * variance)) * b;
     let mut bins = Vec::with_capacity(records.len());
     for one in &projected {
-        let spectra = Spectra::of(one, b);
+        let spectra = Spectra::of(&(&one.columns * b));
         matrix += spectra.covariance(&one.sieve.noise) * (one.weight * one.weight);
         bins.push(spectra.bins());
     }
     let bins = Bins::of(bins, &projected, &matrix);
     let resampled = studentised(&projected, &bins, b, (&left, scale), (draws, seed));
-    let shifts = shifts(records, &projected, precision, variance, &matrix);
+    let steps = b * slope;
+    let shifts = shifts(records, &projected, precision, variance, (b, &steps, &matrix));
     Ok(Covariance {
         independent: (0..count).map(|i| noise * b[(i, i)]).collect(),
         matrix: matrix.row_iter().map(|row| row.iter().copied().collect()).collect(),
         determined: inverse.determined,
         hidden: inverse.hidden,
         shifts,
-        steps: (b * slope).iter().copied().collect(),
+        steps: steps.iter().copied().collect(),
         resampled,
         orders: projected.iter().map(|one| one.sieve.noise.coefficients.len()).collect(),
     })
@@ -139,7 +140,7 @@ fn squares(values: &[f64]) -> f64 {
     values.iter().map(|x| x * x).sum()
 }
 
-/// Spectra of what each value takes of a noise, J B.
+/// Spectra of what each value takes of a noise, in columns.
 struct Spectra {
     /// Of each value, from frequency 0 to half of the sampling rate.
     values: Vec<Vec<(f64, f64)>>,
@@ -147,8 +148,7 @@ struct Spectra {
 }
 
 impl Spectra {
-    fn of(record: &Projected, b: &DMatrix<f64>) -> Self {
-        let columns = &record.columns * b;
+    fn of(columns: &DMatrix<f64>) -> Self {
         let size = (2 * columns.nrows()).next_power_of_two();
         let pairs: Vec<usize> = (0..columns.ncols()).step_by(2).collect();
         let column = |i: usize| columns.as_slice().chunks_exact(columns.nrows()).nth(i);
@@ -214,18 +214,22 @@ impl Spectra {
     }
 }
 
-/// Change of each value by generalised least squares, with the standard deviation of that
-/// where the noise alone makes the difference (Hausman 1978, doi 10.2307/1913827).
+/// Change of each value from least squares to generalised ones, with the standard deviation that the
+/// noise alone gives it (Hausman 1978, doi 10.2307/1913827).
+///
+/// Both estimates are linear in the noise. The variance of their difference is that of D'n, with
+/// D = W J (J' W J)^-1 - J B: the difference of their variances is no use where both are nearly the same.
 fn shifts(
     records: &[Linearised],
     projected: &[Projected],
     precision: &DMatrix<f64>,
     variance: f64,
-    matrix: &DMatrix<f64>,
+    (b, steps, matrix): (&DMatrix<f64>, &DVector<f64>, &DMatrix<f64>),
 ) -> Vec<(f64, f64)> {
     let count = precision.nrows();
     let mut square = precision * 1.0;
     let mut slope = DVector::zeros(count);
+    let mut weighted = Vec::with_capacity(records.len());
     for (record, one) in records.iter().zip(projected) {
         let noise =
             if one.sieve.noise.variance > 0.0 { one.sieve.noise.variance } else { variance };
@@ -240,14 +244,20 @@ fn shifts(
         let residual = DVector::from_vec(one.sieve.noise.innovations(&record.residual));
         square += columns.tr_mul(&columns) / noise;
         slope += columns.tr_mul(&residual) / noise;
+        weighted.push(columns / noise);
     }
     let inverse = Inverse::of(&square).matrix;
-    let moved = &inverse * slope;
-    let spread = |i: usize| {
-        let difference = matrix[(i, i)] - inverse[(i, i)];
-        difference.max(LEAST * matrix[(i, i)]).max(0.0).sqrt()
-    };
-    (0..count).map(|i| (moved[i], spread(i))).collect()
+    let moved = &inverse * slope - steps;
+    let mut spread = matrix * LEAST;
+    for (columns, one) in weighted.iter().zip(projected) {
+        let mut difference = &one.columns * b * -one.weight;
+        for (mut of, column) in difference.column_iter_mut().zip((columns * &inverse).column_iter())
+        {
+            of += DVector::from_vec(one.sieve.noise.reversed_innovations(column.as_slice()));
+        }
+        spread += Spectra::of(&difference).covariance(&one.sieve.noise);
+    }
+    (0..count).map(|i| (moved[i], spread[(i, i)].max(0.0).sqrt())).collect()
 }
 
 #[cfg(test)]
