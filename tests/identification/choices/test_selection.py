@@ -11,6 +11,7 @@ import pytest
 
 import piezotrack as pt
 from piezotrack._support.statistics import sample_noise
+from piezotrack.benchmarking.records.made_up import RECORDS
 from piezotrack.identification.fitted.selection import Trial
 from piezotrack.identification.solve import selection
 from piezotrack.identification.solve.one_model import identify_model
@@ -147,3 +148,12 @@ def test_a_kind_that_diverges_on_the_rest_is_left_out(monkeypatch: pytest.Monkey
     fit = pt.identify(log, method=pt.ParticleSwarm(particles=8, iterations=5, seed=1, runs=1))
     assert names[0] not in tried(fit)
     assert tried(fit)
+
+
+def test_a_rate_that_only_the_whole_record_shows_decides() -> None:
+    # 0.1, 1 and 10 Hz one after the other: the first three fifths do not show the fastest.
+    of_rates = RECORDS["rate-three"]()
+    fit = pt.identify(of_rates.fitted)
+    assert fit.model.info.name == "rate-dependent-prandtl-ishlinskii"
+    # Plays without a rate leave 3.5 times the noise there.
+    assert fit.score(of_rates.others["at 10 Hz"]).rms < 2.0 * of_rates.noise

@@ -56,7 +56,7 @@ NEAR_BEST = 1.5
 OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
 # A residual of so many times the noise, on what was not fitted, is good enough to try no more; one
 # of so many times is good enough to search none.
-AS_NOISE, NEAR_NOISE = 1.5, 2.0
+AS_NOISE, NEAR_NOISE = 1.2, 2.0
 # A fit to the whole records that leaves so many times the noise is not made anew; one to their
 # first parts has a right structure, beside which none is searched.
 NOTHING_BUT_NOISE = 1.2
@@ -133,7 +133,7 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     with shares.begin(len(infos)):
         fit = whole(best, best.start)
         noise = max(noise_of(record.data) for record in problem.records)
-        if best.info.name == MANY_WEIGHTS or fit.cost > NEAR_NOISE * noise:
+        if best.info.name == MANY_WEIGHTS or fit.cost > NOTHING_BUT_NOISE * noise:
             # The first part does not show all that the whole record does.
             least = (1.0 - BETTER_ON_WHOLE) * fit.cost
             if best.info.name == MANY_WEIGHTS:
