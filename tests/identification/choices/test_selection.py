@@ -156,4 +156,6 @@ def test_a_rate_that_only_the_whole_record_shows_decides() -> None:
     fit = pt.identify(of_rates.fitted)
     assert fit.model.info.name == "rate-dependent-prandtl-ishlinskii"
     # Plays without a rate leave 3.5 times the noise there.
-    assert fit.score(of_rates.others["at 10 Hz"]).rms < 2.0 * of_rates.noise
+    noise = of_rates.noise
+    assert noise is not None
+    assert fit.score(of_rates.others["at 10 Hz"]).rms < 2.0 * noise
