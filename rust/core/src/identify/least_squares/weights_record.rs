@@ -90,7 +90,7 @@ impl<'a> WeightsRecord<'a> {
         if k > 0 && self.drive.hold == Hold::First { self.drive.dt } else { f64::INFINITY }
     }
 
-    /// Whether the drive jumps: of what follows, every sample shows another part.
+    /// Whether the drive jumps from one sample to the next.
     pub(super) fn jumps(&self) -> bool {
         let u = &self.drive.u[self.start..];
         let (low, high) = range(u);

@@ -42,6 +42,9 @@ const CORNER_GAIN: f64 = 0.02;
 const ROWS: usize = 2000;
 const ROWS_OF_LEVELS: usize = 4000;
 
+/// How many times as many of a record whose drive jumps: what follows a jump is soon over.
+const OF_JUMPS: usize = 4;
+
 /// Starts of one history each that are refined: those of least cost.
 const REFINED: usize = 2;
 
@@ -88,7 +91,8 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     };
     let mut fit = Fit::new(common, &nodes);
     let every = |one: &WeightsRecord<'_>| {
-        if one.jumps() { 1 } else { one.samples().div_ceil(rows_of(common)) }
+        let times = if one.jumps() { OF_JUMPS } else { 1 };
+        one.samples().div_ceil(times * rows_of(common))
     };
     fit.every = common.records.iter().map(every).collect();
     fit.settle(ROUGH)?;
