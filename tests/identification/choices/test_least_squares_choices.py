@@ -139,10 +139,12 @@ def test_choices_on_a_thinned_record_are_those_of_the_whole() -> None:
 
 
 def test_least_squares_end_where_they_are_to_stop() -> None:
+    # A fit of seconds.
     t = np.arange(100_000) / 1e4
     u = 37.5 - 30.0 * np.cos(2.0 * np.pi * 1.3 * t)
+    free: dict[str, Any] = {"thresholds": None, "creep_times": None, "dynamics": "auto"}
     with pytest.raises(KeyboardInterrupt):
-        fitted(u, noisy(PLAIN.simulate(u, t[1]).x), dt=t[1], stopped=lambda: True)
+        fitted(u, noisy(PLAIN.simulate(u, t[1]).x), dt=t[1], stopped=lambda: True, **free)
 
 
 def test_a_slow_record_shows_no_mode() -> None:
