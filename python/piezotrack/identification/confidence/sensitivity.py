@@ -304,7 +304,7 @@ def _without_search(model: IdentifiedModel) -> IdentifiedModel:
 
 
 def sensitivity(model: IdentifiedModel, data: Dataset, values: list[Value]) -> Sensitivity:
-    """Linearise the displacement of a record about an identified model, by central differences.
+    """Linearise the displacement of a record about an identified model, by differences.
 
     Parameters
     ----------
@@ -336,7 +336,7 @@ def changes(
     motion: Callable[[IdentifiedModel], Array],
     dt: float,
 ) -> Array:
-    """Differentiate a motion by values of an identified model, by central differences.
+    """Differentiate a motion by values of an identified model, by differences.
 
     Parameters
     ----------

@@ -54,12 +54,10 @@ SEARCHED = ("first-order-dahl", "parallel-dahl", "bouc-wen")
 CONTAINED = {"parallel-dahl": "first-order-dahl"}
 NEAR_BEST = 1.5
 OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
-# A residual of so many times the noise, on what was not fitted, is good enough to try no more; one
-# of so many times is good enough to search none.
-AS_NOISE, NEAR_NOISE = 1.2, 2.0
-# A fit to the whole records that leaves so many times the noise is not made anew; one to their
-# first parts has a right structure, beside which none is searched.
-NOTHING_BUT_NOISE = 1.2
+# A residual of so many times the noise has nothing but noise in it: no further model is tried or
+# searched, and a fit to whole records is not made anew. One of so many times, on what was not
+# fitted, is good enough to search none.
+NOTHING_BUT_NOISE, NEAR_NOISE = 1.2, 2.0
 # Another model has to be better by this share than one before it in the list; where the record
 # has one loop, on which all are judged that were fitted to it, by more.
 BETTER, BETTER_ON_ONE_LOOP = 0.03, 0.1
@@ -272,7 +270,7 @@ class _Trials:
         counted = [rest.counted(one) for rest, one in pairs]
         plain = np.array([math.sqrt(float(np.mean(one**2))) for one in counted])
         self.least = min(self.least, float(np.max(plain / np.maximum(noise, 1e-300))))
-        enough = bool(np.all(plain < AS_NOISE * noise)) and all(is_white(one) for one in counted)
+        enough = bool(np.all(plain < NOTHING_BUT_NOISE * noise)) and all(is_white(one) for one in counted)
         if weights and not enough and not self.begun and self.pool:
             quiet = replace(self.how, progress=False, stopped=self.ended.is_set)
             others = self.by_weights[self.by_weights.index(info) + 1 :]
