@@ -122,9 +122,9 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
 
     def whole(one: Tried, start: Structure | None) -> Identification:
         """Fit a model to the whole records, from the structure of their first parts or anew."""
-        kept, rest = None, None
-        if start is not None:
-            kept, rest = replace(start, kept=True), one.rest
+        kept = None if start is None else replace(start, kept=True)
+        # What is chosen anew has a voltage of rest of its own.
+        rest = one.rest if start is one.start else None
         of_model = trials.whole(problem, one.info)
         return identify_model(of_model, methods.method(one.info), run, kept, rest)
 
@@ -270,7 +270,8 @@ class _Trials:
         counted = [rest.counted(one) for rest, one in pairs]
         plain = np.array([math.sqrt(float(np.mean(one**2))) for one in counted])
         self.least = min(self.least, float(np.max(plain / np.maximum(noise, 1e-300))))
-        enough = bool(np.all(plain < NOTHING_BUT_NOISE * noise)) and all(is_white(one) for one in counted)
+        low = bool(np.all(plain < NOTHING_BUT_NOISE * noise))
+        enough = low and all(is_white(one) for one in counted)
         if weights and not enough and not self.begun and self.pool:
             quiet = replace(self.how, progress=False, stopped=self.ended.is_set)
             others = self.by_weights[self.by_weights.index(info) + 1 :]
