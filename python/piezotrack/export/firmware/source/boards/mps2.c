@@ -5,8 +5,9 @@
  *
  * With TIMER_CLOCK the interrupt of a timer runs the loop, in each interval, and a step that is not
  * done when the next one comes is an overrun. A reading waits for it; where the simulation behind it
- * is slower, the timer waits, and begins its interval anew. Without, the reading itself runs the
- * loop: the converters are the clock, in real time or as fast as they are answered.
+ * is slower, the timer waits. Each sample begins its interval anew: the time of the emulator jumps
+ * where the computer is busy, and two intervals would end at once. Without, the reading itself runs
+ * the loop: the converters are the clock, in real time or as fast as they are answered.
  */
 #include "board.h"
 
@@ -107,6 +108,7 @@ static void take_sample(void)
     const unsigned status = frame[4] | late;
     const uint32_t code = (uint32_t)frame[0] | ((uint32_t)frame[1] << 8)
         | ((uint32_t)frame[2] << 16) | ((uint32_t)frame[3] << 24);
+    begin_interval();
     frame_bytes = 0;
     late = 0u;
     answers = true;
@@ -124,7 +126,6 @@ void converters_handler(void)
         frame[frame_bytes] = (uint8_t)CONVERTERS->data;
         frame_bytes++;
         if ((frame_bytes == FRAME) && due) {
-            begin_interval();
             take_sample();
         }
     }
