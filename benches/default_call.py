@@ -42,11 +42,13 @@ def records() -> dict[str, pt.Dataset]:
     lines = np.fft.rfft(rng.normal(size=20_000))
     lines[np.fft.rfftfreq(20_000, 1e-3) > 15.0] = 0.0
     noise = np.fft.irfft(lines, 20_000)
+    levels = np.random.default_rng(4).uniform(0.0, 100.0, 20)
     decaying = np.cos(np.pi * long) * np.exp(-long / 80.0)
     return {
         "measured log, 20 s": pt.datasets.dbo_training()[3.0:23.0],
         "sine of 1 Hz at 5 kHz": record(50.0 - 50.0 * np.cos(2.0 * np.pi * slow), 2e-4),
         "steps": record(np.repeat(rng.uniform(0.0, 100.0, 18), 500), 1e-3, "zoh"),
+        "long steps": record(np.repeat(levels, 5000), 1e-3, "zoh"),
         "decaying sine": record(50.0 - 50.0 * decaying, 1e-3),
         "noise up to 15 Hz": record(50.0 + 45.0 * noise / np.abs(noise).max(), 1e-3),
     }

@@ -9,10 +9,11 @@ use pulp::{Simd, WithSimd};
 use super::fit::Fit;
 use super::follower::Follower;
 use super::record_path::Walk;
+use super::strides::{Stepped, Strides};
 use crate::error::Result;
 use crate::math::{Lanes, dispatch_fused};
-use crate::models::{Relaxation, RelaxationFlow, RelaxationState};
-use crate::signal::Hold;
+use crate::models::{Relaxation, RelaxationState};
+use crate::signal::{Hold, index};
 
 /// Change of a logarithm for a derivative by differences.
 const NUDGE: f64 = 1e-5;
@@ -28,32 +29,33 @@ const MOST_LANES: usize = 4;
 
 /// Parts that the columns go through.
 struct Parts {
-    whole: (Relaxation, RelaxationFlow),
+    whole: Stepped,
     /// Behind the creep: what its relaxations have reached goes through the dynamics alone.
-    bare: (Relaxation, RelaxationFlow),
+    bare: Stepped,
     /// With each number of the dynamics changed a little.
-    nudged: Vec<(Relaxation, RelaxationFlow)>,
-    /// Factor by which each relaxation's departure decays within a sampling interval.
-    decay: Vec<f64>,
+    nudged: Vec<Stepped>,
+    /// Factors by which each relaxation's departure decays within so many sampling intervals.
+    decay: Vec<Vec<f64>>,
 }
 
 impl Parts {
-    fn of(fit: &Fit<'_>, dt: f64) -> Result<Self> {
-        let (whole, bare) = (fit.relaxation()?, Relaxation::new(&[], &[], fit.dynamics())?);
-        let decay = fit.times.iter().map(|time| libm::exp(-dt / time)).collect();
+    fn of(fit: &Fit<'_>, dt: f64, longest: usize) -> Result<Self> {
+        let stepped = |part| Stepped::new(part, dt, longest);
+        let bare = Relaxation::new(&[], &[], fit.dynamics())?;
+        let factor = |time: &f64, gap: usize| libm::exp(-dt * index(gap) / time);
+        let decays = |gap| fit.times.iter().map(|time| factor(time, gap)).collect();
         let slots = fit.layout().poles();
         let nudged = slots.map(|slot| {
             let mut other = fit.clone();
             other.x[slot] += NUDGE;
-            let part = other.relaxation()?;
-            Ok((part, part.flow(dt)))
+            Ok(stepped(other.relaxation()?))
         });
         let nudged: Result<Vec<_>> = nudged.collect();
         Ok(Self {
-            whole: (whole, whole.flow(dt)),
-            bare: (bare, bare.flow(dt)),
+            whole: stepped(fit.relaxation()?),
+            bare: stepped(bare),
             nudged: nudged?,
-            decay,
+            decay: (1..=longest).map(decays).collect(),
         })
     }
 }
@@ -65,8 +67,8 @@ pub(in crate::identify::least_squares) struct Columns<'f, 'a> {
     walk: Walk<'f, 'a>,
     hold: Hold,
     parts: Parts,
+    strides: Strides,
     at: usize,
-    end: usize,
     /// Inputs of weights, dead zones and corners, then that of the stage, in rows of `width`.
     inputs: Vec<f64>,
     width: usize,
@@ -92,7 +94,8 @@ pub(in crate::identify::least_squares) struct Columns<'f, 'a> {
 impl<'f, 'a> Columns<'f, 'a> {
     pub fn of(fit: &'f Fit<'a>, r: usize) -> Result<Self> {
         let (layout, own, record) = (fit.layout(), fit.own(r), &fit.common.records[r]);
-        let parts = Parts::of(fit, record.drive.dt)?;
+        let strides = Strides::of(fit, r, fit.windows[r].end);
+        let parts = Parts::of(fit, record.drive.dt, strides.longest())?;
         let inner = layout.weights + layout.bends + layout.corners;
         let bundle = VECTORS * MOST_LANES;
         let width = (inner + 1).div_ceil(bundle) * bundle;
@@ -100,12 +103,12 @@ impl<'f, 'a> Columns<'f, 'a> {
         let creep = fit.creep_before(r, inner + 1);
         let mut first = vec![0.0; inner + 1];
         let mut walk = fit.walk(r);
-        fit.inputs(walk.next(), &mut first);
-        let ready = |(input, q): (&f64, &Vec<f64>)| Follower::at_rest(&parts.whole.0, *input, q);
-        let bare = |q: &f64| Follower::at_rest(&parts.bare.0, *q, &[]);
+        fit.inputs(walk.at(0), &mut first);
+        let ready = |(input, q): (&f64, &Vec<f64>)| Follower::at_rest(&parts.whole.part, *input, q);
+        let bare = |q: &f64| Follower::at_rest(&parts.bare.part, *q, &[]);
         let mut followers: Vec<Follower> = first.iter().zip(&creep).map(ready).collect();
         let stage = followers[inner];
-        followers.resize(width, Follower::at_rest(&parts.whole.0, 0.0, &[]));
+        followers.resize(width, Follower::at_rest(&parts.whole.part, 0.0, &[]));
         let departed = &fit.x[layout.creep_weights()][..own.departures.len()];
         Ok(Self {
             reached: creep.last().map_or(&[][..], Vec::as_slice).iter().map(bare).collect(),
@@ -114,8 +117,8 @@ impl<'f, 'a> Columns<'f, 'a> {
             nudged: vec![stage; parts.nudged.len()],
             walk: fit.walk(r),
             hold: record.drive.hold,
+            strides,
             at: 0,
-            end: fit.windows[r].end,
             inputs: vec![0.0; BLOCK * width],
             moved: vec![0.0; BLOCK * width],
             stage: Vec::with_capacity(BLOCK),
@@ -134,7 +137,7 @@ impl<'f, 'a> Columns<'f, 'a> {
         self.total
     }
 
-    /// Row `i` of the samples that [`Self::next`] told of.
+    /// Row `i` of the samples that [`Self::next`] returned.
     pub fn row(&self, i: usize) -> &[f64] {
         &self.rows[i * self.total..][..self.total]
     }
@@ -144,60 +147,67 @@ impl<'f, 'a> Columns<'f, 'a> {
         self.stage[i].x
     }
 
-    /// Computes the rows of the next samples: the first, and how many.
-    pub fn next(&mut self) -> Option<(usize, usize)> {
-        let (first, count) = (self.at, BLOCK.min(self.end - self.at));
+    /// Computes the rows of the next samples, and returns which these are.
+    pub fn next(&mut self) -> Option<Vec<usize>> {
+        let first = self.at;
+        let places: Vec<usize> =
+            self.strides.places()[first..].iter().copied().take(BLOCK).collect();
+        let count = places.len();
         if count == 0 {
             return None;
         }
-        for inputs in self.inputs.chunks_exact_mut(self.width).take(count) {
-            self.fit.inputs(self.walk.next(), &mut inputs[..=self.inner]);
+        for (inputs, &k) in self.inputs.chunks_exact_mut(self.width).zip(&places) {
+            self.fit.inputs(self.walk.at(k), &mut inputs[..=self.inner]);
         }
         // The first sample of all is where the followers are at rest.
-        let steps = usize::from(first == 0)..count;
         if first == 0 {
             for (moved, follower) in self.moved.iter_mut().zip(&self.followers) {
                 *moved = follower.state.x;
             }
         }
-        self.follow_stage(steps.clone());
-        let whole = &self.parts.whole;
-        dispatch_fused(Bundles {
-            part: whole,
-            hold: self.hold,
-            followers: &mut self.followers,
-            inputs: &self.inputs,
-            moved: &mut self.moved,
-            steps,
-        });
+        let gaps: Vec<usize> = (first..first + count).map(|at| self.strides.gap(at)).collect();
+        self.follow_stage(&gaps);
+        let mut step = usize::from(first == 0);
+        for alike in gaps[step..].chunk_by(|a, b| a == b) {
+            dispatch_fused(Bundles {
+                part: &self.parts.whole,
+                gap: alike[0],
+                hold: self.hold,
+                followers: &mut self.followers,
+                inputs: &self.inputs,
+                moved: &mut self.moved,
+                steps: step..step + alike.len(),
+            });
+            step += alike.len();
+        }
         for i in 0..count {
             let moved = &self.moved[i * self.width..][..self.inner];
             self.rows[i * self.total..][..self.inner].copy_from_slice(moved);
         }
         self.at += count;
-        Some((first, count))
+        Some(places)
     }
 
-    /// Follow the columns of the stage's own input and creep.
-    fn follow_stage(&mut self, steps: Range<usize>) {
+    /// Follow the columns of the stage's own input and creep over so many intervals each.
+    fn follow_stage(&mut self, gaps: &[usize]) {
         let Parts { whole, bare, nudged, decay } = &self.parts;
         let mut stage = self.followers[self.inner];
         self.stage.clear();
-        for i in 0..steps.end {
+        for (i, &gap) in gaps.iter().enumerate() {
             let input = self.inputs[i * self.width + self.inner];
-            if i >= steps.start {
-                stage.next(&whole.0, &whole.1, self.hold, input);
+            if self.at + i > 0 {
+                stage.next(&whole.part, whole.over(gap), self.hold, input);
                 // These move from sample to sample whatever the hold.
                 for (column, q) in self.reached.iter_mut().zip(stage.state.creep) {
-                    bare.0.step(&bare.1, &mut column.state, q);
+                    bare.part.step(bare.over(gap), &mut column.state, q);
                 }
-                let faded = self.faded.iter_mut().zip(&mut self.left).zip(decay);
+                let faded = self.faded.iter_mut().zip(&mut self.left).zip(&decay[gap - 1]);
                 for ((column, left), factor) in faded {
                     *left *= factor;
-                    bare.0.step(&bare.1, &mut column.state, *left);
+                    bare.part.step(bare.over(gap), &mut column.state, *left);
                 }
-                for (column, (part, flow)) in self.nudged.iter_mut().zip(nudged) {
-                    column.next(part, flow, self.hold, input);
+                for (column, one) in self.nudged.iter_mut().zip(nudged) {
+                    column.next(&one.part, one.over(gap), self.hold, input);
                 }
             }
             self.stage.push(stage.state);
@@ -213,9 +223,10 @@ impl<'f, 'a> Columns<'f, 'a> {
     }
 }
 
-/// Followers in lanes along some samples.
+/// Followers in lanes along some samples, which are so many intervals apart.
 struct Bundles<'s> {
-    part: &'s (Relaxation, RelaxationFlow),
+    part: &'s Stepped,
+    gap: usize,
     hold: Hold,
     followers: &'s mut [Follower],
     inputs: &'s [f64],
@@ -230,7 +241,7 @@ impl WithSimd for Bundles<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let lanes = VECTORS * S::F64_LANES;
         let width = self.followers.len();
-        let (part, flow) = self.part;
+        let (part, flow) = (&self.part.part, self.part.over(self.gap));
         for (b, bundle) in self.followers.chunks_exact_mut(lanes).enumerate() {
             let mut state = RelaxationState {
                 input: gathered(simd, bundle, |one| one.state.input),

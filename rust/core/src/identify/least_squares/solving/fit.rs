@@ -359,7 +359,8 @@ impl<'a> Fit<'a> {
     /// Residual of the displacement of a record, m.
     pub fn rest(&self, r: usize) -> Result<Vec<f64>> {
         let added = self.added(r);
-        let left = self.common.records[r].y.iter().zip(self.motion(r)?).enumerate();
+        let all = Self { every: vec![1; self.every.len()], ..self.clone() };
+        let left = self.common.records[r].y.iter().zip(all.motion(r)?).enumerate();
         Ok(left.map(|(k, (y, x))| y - x - added(k)).collect())
     }
 

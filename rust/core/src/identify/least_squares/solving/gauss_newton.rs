@@ -164,19 +164,20 @@ impl Fit<'_> {
         let mut judged = self.judged(r).peekable();
         let mut motion = Vec::with_capacity(self.windows[r].end);
         let mut squares = 0.0;
-        while let Some((first, count)) = columns.next() {
-            for (i, k) in (first..first + count).enumerate() {
+        while let Some(places) = columns.next() {
+            for (i, k) in places.into_iter().enumerate() {
+                motion.resize(k, motion.last().copied().unwrap_or_default());
                 motion.push(exact.as_ref().map_or(columns.displacement(i), |exact| exact[k]));
                 let counts = judged.next_if_eq(&k).is_some();
                 if !counts && late.is_none() {
                     continue;
                 }
-                recent.push(columns.row(i));
+                recent.push(k, columns.row(i));
                 if !counts {
                     continue;
                 }
-                recent.read(&mut row[..layout.count()], 0);
-                recent.read(&mut row[own.departures.clone()], layout.count());
+                recent.read(k, &mut row[..layout.count()], 0);
+                recent.read(k, &mut row[own.departures.clone()], layout.count());
                 row[own.offset.clone()].fill(1.0);
                 row[own.drift.clone()].fill(fades(k, start));
                 let (before, after) = late.between(k);
@@ -195,7 +196,7 @@ impl Fit<'_> {
 }
 /// The rows of the latest samples, as many as a late reading needs.
 struct Recent {
-    rows: VecDeque<Vec<f64>>,
+    rows: VecDeque<(usize, Vec<f64>)>,
     length: usize,
     late: Late,
 }
@@ -205,24 +206,32 @@ impl Recent {
         Self { rows: VecDeque::new(), length, late }
     }
 
-    /// Takes the row of the next sample.
-    fn push(&mut self, row: &[f64]) {
-        let kept = if self.late.is_none() { 1 } else { self.late.whole() + 2 };
-        let oldest = if self.rows.len() < kept { None } else { self.rows.pop_front() };
-        let mut slot = oldest.unwrap_or_else(|| vec![0.0; self.length]);
+    /// Takes the row of sample `k`.
+    fn push(&mut self, k: usize, row: &[f64]) {
+        let (oldest, _) = self.late.between(k);
+        let mut slot = match self.rows.front() {
+            Some((first, _)) if *first < oldest => self.rows.pop_front().map(|(_, row)| row),
+            _ => None,
+        }
+        .unwrap_or_else(|| vec![0.0; self.length]);
         slot.copy_from_slice(row);
-        self.rows.push_back(slot);
+        self.rows.push_back((k, slot));
     }
 
-    /// The entries from `from` on as they are read at the latest sample.
-    fn read(&self, entries: &mut [f64], from: usize) {
-        let last = self.rows.len() - 1;
+    /// The entries from `from` on as they are read at the latest sample, `k`.
+    fn read(&self, k: usize, entries: &mut [f64], from: usize) {
+        let part = from..from + entries.len();
+        let row = |k: usize| {
+            let place = self.rows.partition_point(|(at, _)| *at < k);
+            &self.rows[place].1[part.clone()]
+        };
         if self.late.is_none() {
-            entries.copy_from_slice(&self.rows[last][from..from + entries.len()]);
+            entries.copy_from_slice(row(k));
             return;
         }
-        for (i, entry) in entries.iter_mut().enumerate() {
-            *entry = self.late.of(last, |k| self.rows[k][from + i]);
+        let (before, after) = self.late.between(k);
+        for ((entry, before), after) in entries.iter_mut().zip(row(before)).zip(row(after)) {
+            *entry = self.late.mixed(*before, *after);
         }
     }
 }

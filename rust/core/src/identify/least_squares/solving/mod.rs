@@ -7,3 +7,4 @@ pub(super) mod form;
 mod gauss_newton;
 mod layout;
 mod record_path;
+mod strides;

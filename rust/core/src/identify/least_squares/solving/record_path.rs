@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::fit::Fit;
 use super::follower::Follower;
+use super::strides::{Stepped, Strides};
 use crate::error::Result;
 use crate::identify::records::history::{History, voltages_before};
 use crate::models::{Dynamics, Experiment, Relaxation, Rest, Values};
@@ -23,17 +24,15 @@ pub(in crate::identify::least_squares) struct Path {
 pub(in crate::identify::least_squares) struct Walk<'f, 'a> {
     fit: &'f Fit<'a>,
     r: usize,
-    k: usize,
     path: Path,
     kept: Option<Arc<[f64]>>,
 }
 
 impl Walk<'_, '_> {
-    /// The signals at the next sample, of which there is one.
+    /// The signals at sample `k`, which comes after those before; the drive is held in between.
     #[inline(always)]
-    pub fn next(&mut self) -> &[f64] {
-        let (k, width) = (self.k, self.path.signals.len());
-        self.k += 1;
+    pub fn at(&mut self, k: usize) -> &[f64] {
+        let width = self.path.signals.len();
         if let Some(kept) = &self.kept {
             return &kept[k * width..][..width];
         }
@@ -46,7 +45,7 @@ impl Walk<'_, '_> {
 impl<'a> Fit<'a> {
     /// The way of record `r` from its first sample on.
     pub fn walk<'f>(&'f self, r: usize) -> Walk<'f, 'a> {
-        let walk = || Walk { fit: self, r, k: 0, path: self.before(r), kept: None };
+        let walk = || Walk { fit: self, r, path: self.before(r), kept: None };
         let samples = self.common.records[r].drive.u.len();
         let count = samples * self.signals.count();
         if count > MOST_KEPT {
@@ -54,14 +53,14 @@ impl<'a> Fit<'a> {
         }
         let make = || {
             let (mut walk, mut all) = (walk(), Vec::with_capacity(count));
-            for _ in 0..samples {
-                all.extend_from_slice(walk.next());
+            for k in 0..samples {
+                all.extend_from_slice(walk.at(k));
             }
             all.into()
         };
         let kept = self.kept[r].get_or_init(make).clone();
         let path = Path { memory: Vec::new(), signals: vec![0.0; self.signals.count()] };
-        Walk { fit: self, r, k: 0, path, kept: Some(kept) }
+        Walk { fit: self, r, path, kept: Some(kept) }
     }
 
     /// The signals after the voltages that the stage visited slowly before record `r`.
@@ -86,14 +85,14 @@ impl<'a> Fit<'a> {
         let drive = self.common.records[r].drive;
         let mut walk = self.walk(r);
         let mut inputs = vec![0.0; width];
-        let mut take = |inputs: &mut Vec<f64>| {
+        let mut take = |inputs: &mut Vec<f64>, k| {
             if width == 1 {
-                inputs[0] = self.bent(self.sum(walk.next()));
+                inputs[0] = self.bent(self.sum(walk.at(k)));
             } else {
-                self.inputs(walk.next(), inputs);
+                self.inputs(walk.at(k), inputs);
             }
         };
-        take(&mut inputs);
+        take(&mut inputs, 0);
         let relaxed = |input: &f64| vec![*input; self.times.len()];
         if self.begins[r].history != History::Settled || self.times.is_empty() {
             let mut reached: Vec<Vec<f64>> = inputs.iter().map(relaxed).collect();
@@ -108,13 +107,15 @@ impl<'a> Fit<'a> {
         else {
             return inputs.iter().map(relaxed).collect();
         };
-        let flow = creep.flow(drive.dt);
+        let strides = Strides::of(self, r, drive.u.len());
+        let creep = Stepped::new(creep, drive.dt, strides.longest());
         let mut followers: Vec<Follower> =
-            inputs.iter().map(|input| Follower::at_rest(&creep, *input, &[])).collect();
-        for _ in &drive.u[1..] {
-            take(&mut inputs);
+            inputs.iter().map(|input| Follower::at_rest(&creep.part, *input, &[])).collect();
+        for (place, &k) in strides.places().iter().enumerate().skip(1) {
+            take(&mut inputs, k);
+            let flow = creep.over(strides.gap(place));
             for (follower, input) in followers.iter_mut().zip(&inputs) {
-                follower.next(&creep, &flow, drive.hold, *input);
+                follower.next(&creep.part, flow, drive.hold, *input);
             }
         }
         let length = drive.dt * index(drive.u.len() - 1);
@@ -137,7 +138,7 @@ impl<'a> Fit<'a> {
         Ok((0..x.len()).map(|k| late.of(k, |k| x[k])).collect())
     }
 
-    /// The same before it is read.
+    /// The same before it is read; of a held drive, what is not judged is that before.
     pub fn undelayed(&self, r: usize) -> Result<Vec<f64>> {
         let drive = self.common.records[r].drive;
         if self.exact {
@@ -147,19 +148,27 @@ impl<'a> Fit<'a> {
             let stage = self.common.model.build(&values)?;
             return Ok(stage.simulate(&experiment)?.ok_or_else(Self::stopped)?.x);
         }
-        let relaxation = self.relaxation()?;
-        let flow = relaxation.flow(drive.dt);
+        let end = self.windows[r].end;
+        let strides = Strides::of(self, r, end);
+        let whole = Stepped::new(self.relaxation()?, drive.dt, strides.longest());
         let mut walk = self.walk(r);
         let creep = self.creep_before(r, 1);
         let mut follower: Option<Follower> = None;
-        let through = |_| {
-            let output = self.bent(self.sum(walk.next()));
-            match &mut follower {
-                Some(follower) => follower.next(&relaxation, &flow, drive.hold, output),
-                none => none.insert(Follower::at_rest(&relaxation, output, &creep[0])).state.x,
-            }
-        };
-        Ok((0..self.windows[r].end).map(through).collect())
+        let mut motion = Vec::with_capacity(end);
+        for (place, &k) in strides.places().iter().enumerate() {
+            let output = self.bent(self.sum(walk.at(k)));
+            let x = match &mut follower {
+                Some(follower) => {
+                    let flow = whole.over(strides.gap(place));
+                    follower.next(&whole.part, flow, drive.hold, output)
+                }
+                none => none.insert(Follower::at_rest(&whole.part, output, &creep[0])).state.x,
+            };
+            motion.resize(k, motion.last().copied().unwrap_or(x));
+            motion.push(x);
+        }
+        motion.resize(end, motion.last().copied().unwrap_or_default());
+        Ok(motion)
     }
 
     /// State of the stage before the first sample of record `r`; that of its mirror image where it
@@ -204,17 +213,16 @@ impl Late {
     /// Reading at sample `k` of values at samples.
     pub fn of(self, k: usize, at: impl Fn(usize) -> f64) -> f64 {
         let (before, after) = self.between(k);
-        let before = at(before);
-        self.0.part.mul_add(at(after) - before, before)
+        self.mixed(at(before), at(after))
+    }
+
+    /// Reading between two values.
+    pub fn mixed(self, before: f64, after: f64) -> f64 {
+        self.0.part.mul_add(after - before, before)
     }
 
     /// The samples between which it is read at sample `k`.
     pub fn between(self, k: usize) -> (usize, usize) {
         (k.saturating_sub(self.0.whole + 1), k.saturating_sub(self.0.whole))
-    }
-
-    /// Whole samples of the delay.
-    pub fn whole(self) -> usize {
-        self.0.whole
     }
 }

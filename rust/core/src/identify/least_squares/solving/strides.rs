@@ -1,0 +1,118 @@
+//! Samples of a record at which its motion is computed, and the steps between them.
+
+use super::fit::Fit;
+use super::record_path::Late;
+use crate::models::{Relaxation, RelaxationFlow};
+use crate::signal::{Hold, index};
+
+/// Samples of a record at which its motion is computed: all of them, or, of a held drive, those
+/// that are read, those at which it changes, and the last. Between these, one step is exact.
+pub(super) struct Strides(Vec<usize>);
+
+impl Strides {
+    /// Those of record `r` before sample `end`.
+    pub fn of(fit: &Fit<'_>, r: usize, end: usize) -> Self {
+        let record = &fit.common.records[r];
+        let u = record.drive.u;
+        if fit.every[r] == 1 || fit.exact || record.drive.hold == Hold::First {
+            return Self((0..end).collect());
+        }
+        let late = Late::new(fit.delay(r), record.drive.dt);
+        let mut needed: Vec<bool> =
+            (0..end).map(|k| k == 0 || u[k].to_bits() != u[k - 1].to_bits()).collect();
+        if let Some(last) = needed.last_mut() {
+            *last = true;
+        }
+        for k in fit.judged(r) {
+            let (before, after) = if late.is_none() { (k, k) } else { late.between(k) };
+            for one in [before, after, k] {
+                needed[one] = true;
+            }
+        }
+        Self((0..end).filter(|k| needed[*k]).collect())
+    }
+
+    /// The samples, in order.
+    pub fn places(&self) -> &[usize] {
+        &self.0
+    }
+
+    /// Intervals from the sample before to the one at `place` of [`Self::places`].
+    pub fn gap(&self, place: usize) -> usize {
+        if place == 0 { 1 } else { self.0[place] - self.0[place - 1] }
+    }
+
+    /// The longest of them.
+    pub fn longest(&self) -> usize {
+        (0..self.0.len()).map(|place| self.gap(place)).max().unwrap_or(1)
+    }
+}
+
+/// A part of the stage with its steps of one interval, of two, and so on.
+pub(super) struct Stepped {
+    pub part: Relaxation,
+    flows: Vec<RelaxationFlow>,
+}
+
+impl Stepped {
+    /// With steps of up to `longest` intervals of `dt` seconds.
+    pub fn new(part: Relaxation, dt: f64, longest: usize) -> Self {
+        let flows = (1..=longest).map(|gap| part.flow(dt * index(gap))).collect();
+        Self { part, flows }
+    }
+
+    /// The step over so many intervals.
+    #[inline(always)]
+    pub fn over(&self, gap: usize) -> &RelaxationFlow {
+        &self.flows[gap - 1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::error::Result;
+    use crate::identify::least_squares::common::Common;
+    use crate::identify::least_squares::solving::fit::{Beginning, Fit};
+    use crate::identify::least_squares::solving::form::Form;
+    use crate::identify::least_squares::weights_record::{WeightsDelay, WeightsRecord};
+    use crate::identify::records::history::History;
+    use crate::models::Model;
+    use crate::signal::{Drive, Hold, NEVER};
+
+    /// Motion of plays that creep, read late, of which every so many samples are judged.
+    fn motion(u: &[f64], every: usize, lag: &[f64]) -> Result<Vec<f64>> {
+        let model = Model::named("prandtl-ishlinskii")?;
+        let Some(of) = model.superposition() else { return Ok(Vec::new()) };
+        let drive = Drive { u, dt: 1e-3, hold: Hold::Zero };
+        let delay = WeightsDelay::Fitted(0.0, 0.01);
+        let record = WeightsRecord { delay, ..WeightsRecord::of(drive, u, 3) };
+        let common = Common::new((model, of), vec![record], false, NEVER);
+        let mut fit = Fit::new(&common, &[2.0, 10.0]);
+        fit.every = vec![every];
+        fit.restructure(|fit| {
+            fit.begins = vec![Beginning { history: History::Settled, from: 0.0 }];
+            fit.times = vec![0.02, 0.3];
+        });
+        fit.set_poles(if lag.is_empty() { Form::None } else { Form::First }, lag);
+        let layout = fit.layout();
+        fit.x[layout.weights()].fill(0.3);
+        fit.x[layout.creep_weights()].fill(0.1);
+        let delay = fit.own(0).delay;
+        fit.x[delay].fill(3.4e-3);
+        fit.motion(0)
+    }
+
+    #[test]
+    fn the_motion_under_a_held_drive_is_that_of_all_samples() -> Result<()> {
+        let levels = [0.0, 60.0, 20.0, 21.0, 90.0, 40.0];
+        let u: Vec<f64> = (0..600).map(|k| levels[k / 7 % levels.len()]).collect();
+        // Behind creep, the input of a lag is taken to be linear within a step.
+        for (lag, most) in [(&[][..], 1e-12), (&[-5.0][..], 0.02)] {
+            let (all, some) = (motion(&u, 1, lag)?, motion(&u, 5, lag)?);
+            for k in (3..u.len()).step_by(5) {
+                assert!((all[k] - some[k]).abs() < most, "{k}: {} and {}", all[k], some[k]);
+            }
+        }
+        Ok(())
+    }
+}
