@@ -87,6 +87,23 @@ def test_intervals_allow_for_a_mass_that_the_record_does_not_show() -> None:
         assert 1.0 < values[name]["ratio"] / abs(values[name]["bias"]) < 2.0
 
 
+def test_intervals_allow_for_a_weight_of_creep_on_its_bound() -> None:
+    """At 0 the faster creep makes up for it, by six deviations, and the gain by two."""
+    case = TRUTHS.CASES["plays, creep"]
+    u = case.drive()
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(u.size)
+    fit = case.fit(u, TRUTHS.motion(case.stage, u, case.dt) + noise)
+    certainty = fit.covariance
+    assert fit.model.creep_weights[1] == 0.0
+    for name in certainty.names:
+        low, high = certainty.interval(name)
+        assert low < CELLS.value_of(case.stage, name) < high
+    k = certainty.names.index("creep_weights[0]")
+    beyond = certainty.values[k] - case.stage.creep_weights[0]
+    assert beyond > 5.0 * np.sqrt(certainty.matrix[k, k])
+    assert beyond < 2.5 * certainty.deviations[k]
+
+
 def test_deviations_of_what_follows_from_other_values_are_those_of_the_estimates() -> None:
     # Thresholds of the drive stay, and the displacements at which elements slip follow.
     values = CELLS.measured("Maxwell slip", "white", 30)["values"]
