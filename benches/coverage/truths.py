@@ -48,7 +48,7 @@ class Case:
     `fitted`: the stage is the model that the call fits to a record of `stage` without noise, whose
     values depend on the record, as levels and envelopes do. `last` is the frequency of a chirp on
     the drive. `foreign`: the stage has other values than the model. `irregular`: intervals are not
-    those of the cell's goal, as the fit chooses among models by chance or ends on a bound.
+    those of the cell's goal, as the fit ends on a bound.
     """
 
     model: str
@@ -132,9 +132,7 @@ def squared() -> dict[str, Case]:
             last=60.0,
         ),
         "plays, creep": Case("prandtl-ishlinskii", creeping, creep | {"drift": False}),
-        "plays, creep, drift by chance": Case(
-            "prandtl-ishlinskii", creeping, creep, irregular=True
-        ),
+        "plays, creep, drift by chance": Case("prandtl-ishlinskii", creeping, creep),
         "Maxwell slip": Case(
             "maxwell-slip",
             pt.MaxwellSlipStage(

@@ -51,7 +51,8 @@ MOST, MOST_RESAMPLED = 2**16, 2**12
 DRAWS, SEED = 199, 1
 # Level at which intervals are widened, and fewest whole periods that tell noise from model error.
 LEVEL, PERIODS = 0.95, 3
-# Deviations of a held mass beyond which it is what the model lacks: a search takes a mass that is.
+# Deviations of a value that is held beyond which it is what the model lacks: a search takes a mass
+# that is.
 MOST_HELD = 5.0
 
 
@@ -266,7 +267,7 @@ def _covariance(
         widening=np.maximum(quantiles / NormalDist().inv_cdf(0.5 + 0.5 * LEVEL), 1.0),
         shifts=np.array(shifts) * sizes[:, None],
         to_least_cost=sizes * (np.array(steps) if aside else 0.0),
-        by_mass=_by_mass(model, records, at, sizes, np.array(steps)),
+        by_held=_by_held(model, records, at, sizes, np.array(steps)),
         samples=sum(record.samples for record in linear),
         orders=tuple(orders),
         hidden=np.array(hidden).reshape(-1, sizes.size) * sizes,
@@ -275,21 +276,45 @@ def _covariance(
     )
 
 
-def _by_mass(
+def _by_held(
     model: IdentifiedModel, records: Records, at: list[Sensitivity], sizes: Array, steps: Array
 ) -> Array:
-    """Return `Covariance.by_mass`: 0 where no mass was held."""
-    none, mass = np.zeros((steps.size, 2)), getattr(model, "parameters", {}).get("mass")
-    if mass is None or mass.free or mass.deviation is None:
-        return none
+    """Return `Covariance.by_held`: of several values that are held, of the likeliest above 0."""
+    freed = [_freed(value, model, records, at, sizes) for value in _held(model)]
+    shown = [one for one in freed if one is not None]
+    if not shown:
+        return np.zeros((steps.size, 2))
+    ratio, found = max(shown, key=lambda one: one[0])
+    changes = sizes * (found - steps)
+    return np.outer(changes / ratio, [min(ratio, MOST_HELD), 1.0])
+
+
+def _held(model: IdentifiedModel) -> list[Value]:
+    """Values that are held at 0: a mass without effect, weights of creep on their bound."""
+    mass = getattr(model, "parameters", {}).get("mass")
+    is_held = mass is not None and not mass.free and mass.deviation is not None
+    free = model.details.get("parameters", {}).get("creep_weights", {}).get("free", False)
+    weights = model.model.creep_weights if free else ()
+    creep = [Value("creep_weights", k) for k, weight in enumerate(weights) if weight == 0.0]
+    return [Value("mass"), *creep] if is_held else creep
+
+
+def _freed(
+    value: Value,
+    model: IdentifiedModel,
+    records: Records,
+    at: list[Sensitivity],
+    sizes: Array,
+) -> tuple[float, Array] | None:
+    """Fit a value that is held too: its best one in its deviations, and the steps of the others."""
     # The step of `sensitivity`, in a mass without effect, is one of rounding.
-    twice = moved(model, [Value("mass")], np.array([mass.value]))
-    if twice is None:
-        return none
+    other = moved(model, [value], sizes_of(model, [value], records[0][0].dt))
+    if other is None:
+        return None
     known = [LinearisedRecord(model, data) for data, _ in records]
     extended = [
         _Linear(
-            replace(one, columns=np.vstack([one.columns, of.begun(twice) - of.begun(model)])),
+            replace(one, columns=np.vstack([one.columns, of.begun(other) - of.begun(model)])),
             data,
             weight,
             np.append(sizes, 1.0),
@@ -301,10 +326,8 @@ def _by_mass(
         [record.thinned(MOST) for record in extended], np.diag(precision).tolist(), 0, SEED
     )
     if not determined[-1] or found[-1] == 0.0:
-        return none
-    ratio = found[-1] / math.sqrt(matrix[-1][-1])
-    changes = sizes * (np.array(found[:-1]) - steps)
-    return np.outer(changes / ratio, [min(ratio, MOST_HELD), 1.0])
+        return None
+    return found[-1] / math.sqrt(matrix[-1][-1]), np.array(found[:-1])
 
 
 def _precision(model: IdentifiedModel, values: list[Value]) -> Array:

@@ -44,10 +44,10 @@ LISTS = (
     "widening",
     "shifts",
     "to_least_cost",
-    "by_mass",
+    "by_held",
 )
 # Those of them with two entries for each value.
-PAIRS = ("shifts", "by_mass")
+PAIRS = ("shifts", "by_held")
 
 
 class Interval(NamedTuple):
@@ -116,11 +116,11 @@ class Covariance:
     to_least_cost : ndarray, shape (p,)
         Change of each value to where the cost is least, which an interval includes: not 0 where the
         fit has the shortest lag that fits as well (`Identification.lags`).
-    by_mass : ndarray, shape (p, 2)
-        What a mass that was held, as the records do not show it, would change each value by: the
-        mass of least cost, of five standard deviations at most, and one standard deviation. An
-        interval reaches as far as that of the fit with this mass, on the side to which a mass moves
-        the value. 0 where none was held.
+    by_held : ndarray, shape (p, 2)
+        What a value held at 0, as the records do not show it, would change each value by: a mass,
+        or a weight of creep on its bound. Its value of least cost, of five standard deviations at
+        most, and one standard deviation. An interval reaches as far as that of the fit with it, on
+        the side to which it moves the value. 0 where none was held; of several the likeliest.
     samples : int
         Samples of the records.
     orders : tuple of int
@@ -161,7 +161,7 @@ class Covariance:
     widening: Array
     shifts: Array
     to_least_cost: Array
-    by_mass: Array
+    by_held: Array
     samples: int
     orders: tuple[int, ...]
     hidden: Array
@@ -172,13 +172,13 @@ class Covariance:
     def deviations(self) -> Array:
         """Standard deviations, SI, shape (p,); infinite where a value is not determined.
 
-        With what a mass leaves open that was held (`by_mass`), which the matrix has not.
+        With what a value leaves open that was held at 0 (`by_held`), which the matrix has not.
         """
-        moved, spread = self.by_mass.T
-        # Root mean square of what a mass above 0 moves, within a tenth.
-        by_mass = 0.5 * (np.hypot(moved, 2.0 * spread) + moved * np.sign(spread))
+        moved, spread = self.by_held.T
+        # Root mean square of what a value above 0 moves, within a tenth.
+        by_held = 0.5 * (np.hypot(moved, 2.0 * spread) + moved * np.sign(spread))
         own = np.sqrt(np.diag(self.matrix))
-        return np.where(self.determined, np.hypot(own, by_mass), np.inf)
+        return np.where(self.determined, np.hypot(own, by_held), np.inf)
 
     @property
     def effective_samples(self) -> Array:
@@ -256,7 +256,7 @@ class Covariance:
             return Interval(-math.inf, math.inf)
         normal = float(self.widening[place] * normal_reach(level))
         own = math.sqrt(self.matrix[place, place])
-        further = _further(normal, own, *self.by_mass[place])
+        further = _further(normal, own, *self.by_held[place])
         ends = float(self.values[place]) + np.array([0.0, self.to_least_cost[place], further])
         return Interval(float(ends.min()) - normal * own, float(ends.max()) + normal * own)
 
@@ -289,7 +289,7 @@ class Covariance:
             whole = float(variances.sum())
             widening = float(variances @ self.widening) / whole if whole > 0.0 else 1.0
             deviation = math.sqrt(max(float(gradient @ self.matrix @ gradient), 0.0))
-            further = _further(normal * widening, deviation, *(gradient @ self.by_mass))
+            further = _further(normal * widening, deviation, *(gradient @ self.by_held))
             reach = normal * widening * deviation
             reach += max(abs(float(gradient @ self.to_least_cost)), abs(further))
         return reach if math.isfinite(reach) else math.inf
@@ -317,7 +317,7 @@ class Covariance:
 
 
 def _further(normal: float, deviation: float, moved: float, spread: float) -> float:
-    """How much further an interval reaches with a mass, to the side to which it moves a value."""
+    """How much further an interval reaches by a value that was held, to the side of its effect."""
     more = moved * math.copysign(1.0, spread) + normal * (math.hypot(deviation, spread) - deviation)
     return math.copysign(max(more, 0.0), spread)
 
@@ -431,8 +431,8 @@ def covariance_of_file(entry: Any, known: Collection[str]) -> Covariance | None:
         matrix[i, : i + 1] = matrix[: i + 1, i] = _numbers("matrix", row, (i + 1,))
     if np.diag(matrix).min() < 0.0:
         raise ParameterError("covariance: matrix", "a variance below 0", "0 or above", verb="has")
-    # Older files have nothing of a mass.
-    given = {"by_mass": [[0.0, 0.0]] * count} | found
+    # Older files have nothing of what was held.
+    given = {"by_held": [[0.0, 0.0]] * count} | found
     lists = {
         name: _numbers(name, given[name], (count, 2) if name in PAIRS else (count,))
         for name in LISTS
