@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use super::columns::Columns;
 use super::fit::Fit;
-use super::record_path::Late;
+use super::late::Late;
 use crate::error::Result;
 use crate::identify::least_squares::settings::{ROUGH, STEPS};
 use crate::identify::least_squares::weights_record::{WeightsDelay, WeightsRecord};

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use super::fit::Fit;
 use super::follower::Follower;
+use super::late::Late;
 use super::strides::{Stepped, Strides};
 use crate::error::Result;
 use crate::identify::records::history::{History, voltages_before};
 use crate::models::{Dynamics, Experiment, Relaxation, Rest, Values};
-use crate::signal::{FractionalDelay, index};
+use crate::signal::index;
 
 /// Signals of a record that are kept, at most: those of a longer one are made whenever they are needed.
 const MOST_KEPT: usize = 1 << 22;
@@ -192,37 +193,5 @@ impl<'a> Fit<'a> {
         let sum = of_motion * self.sum(&path.signals);
         let rest = Rest { x, volts, sum, memory: &memory, creep: &creep, modes };
         Ok(self.common.of.state_at_rest(&rest))
-    }
-}
-
-/// A reading that comes late, on straight lines between samples; before the first sample the stage
-/// is where it starts.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::identify::least_squares) struct Late(FractionalDelay);
-
-impl Late {
-    pub fn new(delay: f64, dt: f64) -> Self {
-        Self(FractionalDelay::new(delay, dt))
-    }
-
-    /// Whether readings are in time.
-    pub fn is_none(self) -> bool {
-        self.0.whole == 0 && self.0.part >= 1.0
-    }
-
-    /// Reading at sample `k` of values at samples.
-    pub fn of(self, k: usize, at: impl Fn(usize) -> f64) -> f64 {
-        let (before, after) = self.between(k);
-        self.mixed(at(before), at(after))
-    }
-
-    /// Reading between two values.
-    pub fn mixed(self, before: f64, after: f64) -> f64 {
-        self.0.part.mul_add(after - before, before)
-    }
-
-    /// The samples between which it is read at sample `k`.
-    pub fn between(self, k: usize) -> (usize, usize) {
-        (k.saturating_sub(self.0.whole + 1), k.saturating_sub(self.0.whole))
     }
 }

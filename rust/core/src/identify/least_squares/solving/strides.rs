@@ -1,7 +1,7 @@
 //! Samples of a record at which its motion is computed, and the steps between them.
 
 use super::fit::Fit;
-use super::record_path::Late;
+use super::late::Late;
 use crate::models::{Relaxation, RelaxationFlow};
 use crate::signal::{Hold, index};
 
