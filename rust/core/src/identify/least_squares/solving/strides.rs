@@ -5,8 +5,9 @@ use super::late::Late;
 use crate::models::{Relaxation, RelaxationFlow};
 use crate::signal::{Hold, index};
 
-/// Samples of a record at which its motion is computed: all of them, or, of a held drive, those
-/// that are read, those at which it changes, and the last. Between these, one step is exact.
+/// Samples of a record at which its motion is computed: all of them, or, of a held drive of which
+/// every so many are judged, these, those at which they are read, those at which the drive changes,
+/// and the last. Between these, one step is exact.
 pub(super) struct Strides(Vec<usize>);
 
 impl Strides {
@@ -17,17 +18,16 @@ impl Strides {
         if fit.every[r] == 1 || fit.exact || record.drive.hold == Hold::First {
             return Self((0..end).collect());
         }
-        let late = Late::new(fit.delay(r), record.drive.dt);
+        // Also in the warm-up and where readings are left out, or a step would be of any length.
+        let (every, first) = (fit.every[r], fit.windows[r].start);
+        let regular = |k: usize| k % every == first % every;
+        let changes = |k: usize| k == 0 || u[k].to_bits() != u[k - 1].to_bits();
         let mut needed: Vec<bool> =
-            (0..end).map(|k| k == 0 || u[k].to_bits() != u[k - 1].to_bits()).collect();
-        if let Some(last) = needed.last_mut() {
-            *last = true;
-        }
-        for k in fit.judged(r) {
-            let (before, after) = if late.is_none() { (k, k) } else { late.between(k) };
-            for one in [before, after, k] {
-                needed[one] = true;
-            }
+            (0..end).map(|k| regular(k) || changes(k) || k + 1 == end).collect();
+        let late = Late::new(fit.delay(r), record.drive.dt);
+        for k in fit.judged(r).filter(|_| !late.is_none()) {
+            let (before, after) = late.between(k);
+            (needed[before], needed[after]) = (true, true);
         }
         Self((0..end).filter(|k| needed[*k]).collect())
     }
@@ -70,6 +70,7 @@ impl Stepped {
 
 #[cfg(test)]
 mod tests {
+    use super::Strides;
     use crate::error::Result;
     use crate::identify::least_squares::common::Common;
     use crate::identify::least_squares::solving::fit::{Beginning, Fit};
@@ -78,6 +79,20 @@ mod tests {
     use crate::identify::records::history::History;
     use crate::models::Model;
     use crate::signal::{Drive, Hold, NEVER};
+
+    #[test]
+    fn no_step_is_longer_than_from_one_judged_sample_to_the_next() -> Result<()> {
+        let (u, left_out) = ([1.0; 500], [true; 500]);
+        let model = Model::named("prandtl-ishlinskii")?;
+        let Some(of) = model.superposition() else { return Ok(()) };
+        let drive = Drive { u: &u, dt: 1e-3, hold: Hold::Zero };
+        let record = WeightsRecord { left_out: &left_out, ..WeightsRecord::of(drive, &u, 207) };
+        let common = Common::new((model, of), vec![record], false, NEVER);
+        let mut fit = Fit::new(&common, &[2.0]);
+        fit.every = vec![5];
+        assert_eq!(Strides::of(&fit, 0, u.len()).longest(), 5);
+        Ok(())
+    }
 
     /// Motion of plays that creep, read late, of which every so many samples are judged.
     fn motion(u: &[f64], every: usize, lag: &[f64]) -> Result<Vec<f64>> {
