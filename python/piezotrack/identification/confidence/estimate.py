@@ -16,16 +16,8 @@ from ..fitted.certainty.covariance import Covariance, NoiseShares, is_hidden
 from ..solve.judging import SAME_PERIOD, period_of
 from ..solve.search import details_of
 from .held_out import held_out
-from .sensitivity import (
-    DELAY,
-    LinearisedRecord,
-    Value,
-    fitted_values,
-    gradient,
-    moved,
-    sensitivity,
-    sizes_of,
-)
+from .sensitivity import LinearisedRecord, gradient, sensitivity
+from .values import DELAY, Value, entries_of, fitted_values, moved, sizes_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -293,7 +285,7 @@ def _held(model: IdentifiedModel) -> list[Value]:
     """Values that are held at 0: a mass without effect, weights of creep on their bound."""
     mass = getattr(model, "parameters", {}).get("mass")
     is_held = mass is not None and not mass.free and mass.deviation is not None
-    free = model.details.get("parameters", {}).get("creep_weights", {}).get("free", False)
+    free = entries_of(model).get("creep_weights", {}).get("free", False)
     weights = model.model.creep_weights if free else ()
     creep = [Value("creep_weights", k) for k, weight in enumerate(weights) if weight == 0.0]
     return [Value("mass"), *creep] if is_held else creep
@@ -332,7 +324,7 @@ def _freed(
 
 def _precision(model: IdentifiedModel, values: list[Value]) -> Array:
     """Inverse squares of the widths of the priors, SI; 0 without one."""
-    entries = model.details.get("parameters", {})
+    entries = entries_of(model)
     priors = [entries.get(value.parameter, {}).get("prior") for value in values]
     return np.array(
         [0.0 if prior is None else prior[1] ** -2 for prior in priors], dtype=np.float64

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...data.checks.diagnostics import amplitudes, turns
-from .sensitivity import fitted_values, sizes_of
+from .values import fitted_values, sizes_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,13 +11,13 @@ from ...data.dataset import Dataset
 from ...errors import ParameterError
 from ..fitted.identified_model import IdentifiedModel
 from .estimate import covariance_of
-from .sensitivity import fitted_values, moved, sizes_of
+from .values import fitted_values, moved, sizes_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..fitted.certainty.covariance import Covariance
-    from .sensitivity import Value
+    from .values import Value
 
     Array = NDArray[np.float64]
 

@@ -17,7 +17,8 @@ from ..fitted.certainty.prediction_band import PredictionBand
 from ..fitted.identified_model import IdentifiedModel
 from .estimate import covariance_of
 from .held_out import held_out
-from .sensitivity import changes, fitted_values, sensitivity
+from .sensitivity import changes, sensitivity
+from .values import fitted_values
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

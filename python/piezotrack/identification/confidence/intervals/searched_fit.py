@@ -17,7 +17,7 @@ from ...problem.parameter import Parameter
 from ...problem.problem import Problem
 from ...problem.records import Record
 from ..estimate import covariance_of
-from ..sensitivity import DELAY, Value, fitted_values, moved
+from ..values import DELAY, Value, fitted_values, moved
 from .local_weights import LocalWeights
 
 if TYPE_CHECKING:

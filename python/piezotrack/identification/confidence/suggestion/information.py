@@ -11,7 +11,8 @@ import numpy as np
 from ....errors import NumericalError, ParameterError
 from ...fitted.identified_model import IdentifiedModel
 from ...solve.weights import CHOSEN
-from ..sensitivity import free_values, moved, sensitivity
+from ..sensitivity import sensitivity
+from ..values import free_values, moved
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from ....stages.base import Stage
     from ....stages.motion import StageState
     from ...fitted.identification import Identification
-    from ..sensitivity import Value
+    from ..values import Value
 
     Array = NDArray[np.float64]
 
