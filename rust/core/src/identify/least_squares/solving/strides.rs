@@ -71,7 +71,7 @@ impl Stepped {
 #[cfg(test)]
 mod tests {
     use super::Strides;
-    use crate::error::Result;
+    use crate::error::{Error, Result};
     use crate::identify::least_squares::common::Common;
     use crate::identify::least_squares::solving::fit::{Beginning, Fit};
     use crate::identify::least_squares::solving::form::Form;
@@ -80,41 +80,45 @@ mod tests {
     use crate::models::Model;
     use crate::signal::{Drive, Hold, NEVER};
 
+    /// A record of plays under a held drive, of which every so many samples are judged.
+    fn with_fit<T>(
+        record: WeightsRecord<'_>,
+        every: usize,
+        of: impl FnOnce(Fit<'_>) -> Result<T>,
+    ) -> Result<T> {
+        let model = Model::named("prandtl-ishlinskii")?;
+        let plays = model.superposition().ok_or_else(|| Error::Data("no plays".into()))?;
+        let common = Common::new((model, plays), vec![record], false, NEVER);
+        of(Fit { every: vec![every], ..Fit::new(&common, &[2.0, 10.0]) })
+    }
+
     #[test]
     fn no_step_is_longer_than_from_one_judged_sample_to_the_next() -> Result<()> {
         let (u, left_out) = ([1.0; 500], [true; 500]);
-        let model = Model::named("prandtl-ishlinskii")?;
-        let Some(of) = model.superposition() else { return Ok(()) };
         let drive = Drive { u: &u, dt: 1e-3, hold: Hold::Zero };
         let record = WeightsRecord { left_out: &left_out, ..WeightsRecord::of(drive, &u, 207) };
-        let common = Common::new((model, of), vec![record], false, NEVER);
-        let mut fit = Fit::new(&common, &[2.0]);
-        fit.every = vec![5];
-        assert_eq!(Strides::of(&fit, 0, u.len()).longest(), 5);
+        let longest = with_fit(record, 5, |fit| Ok(Strides::of(&fit, 0, u.len()).longest()))?;
+        assert_eq!(longest, 5);
         Ok(())
     }
 
-    /// Motion of plays that creep, read late, of which every so many samples are judged.
+    /// Motion of plays that creep, read late.
     fn motion(u: &[f64], every: usize, lag: &[f64]) -> Result<Vec<f64>> {
-        let model = Model::named("prandtl-ishlinskii")?;
-        let Some(of) = model.superposition() else { return Ok(Vec::new()) };
         let drive = Drive { u, dt: 1e-3, hold: Hold::Zero };
         let delay = WeightsDelay::Fitted(0.0, 0.01);
         let record = WeightsRecord { delay, ..WeightsRecord::of(drive, u, 3) };
-        let common = Common::new((model, of), vec![record], false, NEVER);
-        let mut fit = Fit::new(&common, &[2.0, 10.0]);
-        fit.every = vec![every];
-        fit.restructure(|fit| {
-            fit.begins = vec![Beginning { history: History::Settled, from: 0.0 }];
-            fit.times = vec![0.02, 0.3];
-        });
-        fit.set_poles(if lag.is_empty() { Form::None } else { Form::First }, lag);
-        let layout = fit.layout();
-        fit.x[layout.weights()].fill(0.3);
-        fit.x[layout.creep_weights()].fill(0.1);
-        let delay = fit.own(0).delay;
-        fit.x[delay].fill(3.4e-3);
-        fit.motion(0)
+        with_fit(record, every, |mut fit| {
+            fit.restructure(|fit| {
+                fit.begins = vec![Beginning { history: History::Settled, from: 0.0 }];
+                fit.times = vec![0.02, 0.3];
+            });
+            fit.set_poles(if lag.is_empty() { Form::None } else { Form::First }, lag);
+            let (layout, own) = (fit.layout(), fit.own(0));
+            fit.x[layout.weights()].fill(0.3);
+            fit.x[layout.creep_weights()].fill(0.1);
+            fit.x[own.delay].fill(3.4e-3);
+            fit.motion(0)
+        })
     }
 
     #[test]
