@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import piezotrack as pt
 from piezotrack._support.files.writing import save_figures
@@ -207,6 +208,17 @@ def test_a_long_record_is_thinned_but_keeps_its_ends_and_shape() -> None:
     assert 5_000 < x.size <= 20_000
     assert (x.min(), x.max()) == pytest.approx((0.0, 75.0), abs=1e-3)
     assert (y.min(), y.max()) == pytest.approx((0.0, 120.0), abs=1e-3)
+
+
+def test_the_loop_of_a_long_record_of_steps_has_its_corners() -> None:
+    # The drive jumps where the stage has not moved yet, which moves while the drive is held.
+    u = np.repeat(np.random.default_rng(1).uniform(0.0, 75.0, 40), 1507)
+    x = 1.6e-6 * lfilter([0.05], [1.0, -0.95], np.concatenate((u[:1], u[:-1])))
+    log = pt.Dataset(u=u, y=x, dt=1e-3, hold="zoh")
+    volts, um = points(plot_loop(log, replace(response(), t=log.t, u=u, x=x)), 1)
+    both = np.minimum(np.abs(np.diff(volts)) / 75.0, np.abs(np.diff(um)) / 120.0)
+    assert volts.size < 20_000
+    assert both.max() < 0.05
 
 
 def test_a_spike_in_a_long_record_is_not_thinned_away() -> None:

@@ -345,9 +345,9 @@ def axes_or_new(given: Axes | Sequence[Axes] | None, count: int) -> list[Axes]:
     return axes
 
 
-def thinned(values: Array) -> NDArray[np.intp]:
-    """Choose the samples of a signal to draw, as `extremes` does."""
-    return extremes(values, MOST_POINTS)
+def thinned(*signals: Array) -> NDArray[np.intp]:
+    """Choose the samples to draw of signals of the same instants, as `extremes` does of each."""
+    return np.unique(np.concatenate([extremes(values, MOST_POINTS) for values in signals]))
 
 
 def trace(

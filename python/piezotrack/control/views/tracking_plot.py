@@ -187,7 +187,7 @@ def plot_feedforward(
     drive = axes["drive"]
     trace(drive, t, scale * voltage, FEEDFORWARD, steps=True, xlabel="time [s]", ylabel=label)
     share(drive, axes["reference"])
-    kept = thinned(voltage)
+    kept = thinned(voltage, x)
     axes["over"].plot(1e6 * x[kept], scale * voltage[kept], **FEEDFORWARD)
     axes["over"].set(xlabel="reference [um]", ylabel=label)
     for ax in (drive, axes["over"]) if limits is not None else ():

@@ -42,7 +42,7 @@ def plot_dataset(data: Dataset, fig: Figure | SubFigure | None = None) -> Figure
     trace(drive, data.t, u, dark, steps=data.hold == "zoh", xlabel="time [s]", ylabel=of_drive)
     trace(displacement, data.t, y, RECORDED, xlabel="time [s]", ylabel=in_metres)
     stack((drive, displacement), numbers=True)
-    kept = thinned(y)
+    kept = thinned(y, u)
     loop.plot(u[kept], y[kept], **RECORDED)
     loop.set(xlabel=of_drive, ylabel=in_metres)
     for ax, words in ((drive, "Drive"), (displacement, "Displacement"), (loop, "Hysteresis loop")):

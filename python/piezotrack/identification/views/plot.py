@@ -97,7 +97,7 @@ def _loop(ax: Axes, u: Array, signals: Mapping[str, Array], drive_unit: str) -> 
     unit, scale = best_length_unit(max(float(np.ptp(x)) for x in signals.values()))
     drive, times = shown_unit(drive_unit)
     for name, x in signals.items():
-        kept = thinned(x)
+        kept = thinned(x, u)
         ax.plot(times * u[kept], scale * x[kept], **STYLES[name])
     ax.set(xlabel=f"drive [{literal(drive)}]", ylabel=f"displacement [{unit}]")
     # Beside the loop, which fills the other diagonal.

@@ -52,7 +52,7 @@ def plot_band(band: PredictionBand, fig: Figure | SubFigure | None = None) -> Fi
 def _loop(band: PredictionBand, ax: Axes) -> None:
     unit, scale = best_length_unit(float(np.ptp(band.x)))
     drive, times = shown_unit(band.drive_unit)
-    kept = thinned(band.x)
+    kept = thinned(band.x, band.u)
     u, x = times * band.u[kept], scale * band.x[kept]
     if band.measured is not None:
         ax.plot(u, scale * band.measured[kept], **MEASURED)

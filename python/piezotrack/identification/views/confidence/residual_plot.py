@@ -131,7 +131,7 @@ def _spectrum(ax: Axes, residual: Residual, unit: str, scale: float) -> None:
         f[1:], scale * np.sqrt(power[1:]), **{**RECORDED, "linewidth": 0.9, "label": "residual"}
     )
     level = scale * residual.noise * float(np.sqrt(2.0 * dt))
-    ax.axhline(level, **LEVEL, label="noise from sample to sample")
+    ax.axhline(level, **LEVEL, label="white noise")
     ax.set(xlabel="frequency [Hz]", ylabel=f"density [{unit}/\N{SQUARE ROOT}Hz]")
     heading(ax, "Spectrum")
     legend_inside(ax, ncols=1)
