@@ -61,6 +61,20 @@ def test_a_stage_at_rest_before_the_drive_jumped_is_known(hold: Hold, tmp_path: 
     assert named.cost == pytest.approx(fit.cost, rel=1e-6)
 
 
+def test_a_jump_is_found_in_a_long_record_of_noise() -> None:
+    """Its error, of few samples, is above the noise of all of them."""
+    u = np.repeat(np.random.default_rng(2).uniform(20.0, 100.0, 40), 300)
+    x = STAGE.simulate(np.concatenate(([0.0], u)), DT, hold="zoh").x[1:]
+    noise = 1.2e-6
+    y = x + noise * np.random.default_rng(0).normal(size=u.size)
+    fit = pt.identify(
+        pt.Dataset(u=u, y=y, dt=DT, hold="zoh"), "prandtl-ishlinskii", progress=False
+    )
+    assert fit.start is not None
+    assert fit.start.history == "rest"
+    assert fit.cost < 1.01 * noise
+
+
 def test_the_voltage_of_rest_is_found() -> None:
     fit = pt.identify(jumping(before=90.0), "prandtl-ishlinskii", progress=False)
     assert fit.start is not None

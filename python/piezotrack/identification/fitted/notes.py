@@ -41,6 +41,8 @@ VISCOUS = 0.02
 LARGE = 0.05
 # Share of the window that the first samples may be, and of the squared residual that they carry.
 FIRST, CARRIED = 0.1, 0.5
+# Share of the squared residual without which its root hardly differs.
+MATTERS = 0.04
 # Margin of the drive's range, and factor of its rate, beyond which a model was not fitted.
 MARGIN, FASTER = 0.01, 2.0
 # Share of the drive's range up to which its step to the first sample is none to speak of.
@@ -279,14 +281,31 @@ def lag_notes(lags: LagRange | None, frequency: float, lag: float | None = None)
     ]
 
 
-def carried_by_first_samples(rest: Array) -> bool:
-    """Return whether the first tenth of a residual carries more than half of its squares."""
+def carried_by_first_samples(rest: Array, noise: float) -> bool:
+    """Return whether the first tenth of a residual carries more than half of it.
+
+    Parameters
+    ----------
+    rest : ndarray, shape (n,)
+        Residual in the window [m].
+    noise : float
+        Standard deviation of the noise, whose squares do not count [m].
+
+    Returns
+    -------
+    bool
+        False also where the squares of the first tenth are too few to matter.
+    """
     squares = (rest - rest.mean()) ** 2
+    above = np.cumsum(squares - noise**2)
     count = math.floor(FIRST * rest.size)
-    return count > 0 and bool(squares[:count].sum() >= CARRIED * squares.sum())
+    if count == 0:
+        return False
+    least = max(CARRIED * above[-1], MATTERS * squares.sum())
+    return bool(above[count - 1] > 0.0 and above[count - 1] >= least)
 
 
-def first_samples(rest: Array, data: Dataset) -> list[str]:
+def first_samples(rest: Array, data: Dataset, noise: float) -> list[str]:
     """Say that the first samples carry the cost.
 
     Parameters
@@ -295,16 +314,18 @@ def first_samples(rest: Array, data: Dataset) -> list[str]:
         Residual in the window [m].
     data : Dataset
         The record.
+    noise : float
+        Standard deviation of the noise [m].
 
     Returns
     -------
     list of str
         One sentence with the seconds to leave out, or none.
     """
+    if not carried_by_first_samples(rest, noise):
+        return []
     squares = np.cumsum((rest - rest.mean()) ** 2)
     count = math.floor(FIRST * rest.size)
-    if squares[-1] == 0.0 or not carried_by_first_samples(rest):
-        return []
     # As far as the residual is well above that of the rest.
     later = (squares[-1] - squares[count - 1]) / (rest.size - count)
     above = np.flatnonzero((rest[:count] - rest.mean()) ** 2 > 4.0 * later)

@@ -60,7 +60,7 @@ def with_rest_tried(problem: Problem, fit: Identification, identify: Identify) -
     data = record.data
     if record.history is not None or data.warmup:
         return fit
-    if not carried_by_first_samples(_left(fit, data)):
+    if not carried_by_first_samples(_left(fit, data), fit.noises[0]):
         return fit
     jumped = with_rest(problem, identify)
     before = float(np.sqrt(np.mean(_left(fit, jumped.data) ** 2)))
@@ -103,7 +103,7 @@ def with_rest(problem: Problem, identify: Identify, known: float | None = None) 
         raise ParameterError("history", "'rest'", "another one of several records")
     data = problem.records[0].data
     fit = _at_rest(problem, identify, 0.0 if known is None else known)
-    if known is None and carried_by_first_samples(_left(fit, fit.data)):
+    if known is None and carried_by_first_samples(_left(fit, fit.data), fit.noises[0]):
         begun = _begun(problem)
         start = Structure.of(fit) if isinstance(fit.method, LeastSquares) else None
         costs: dict[float, float] = {}
