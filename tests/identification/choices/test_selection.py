@@ -34,6 +34,29 @@ SMOOTH = pt.FirstOrderDahlStage(
 )
 
 
+BRANCHES = pt.BoucWenStage(
+    mass=0.36,
+    damping=160.0,
+    stiffness=1e6,
+    piezo_coefficient=4.8e-7,
+    alpha=0.3,
+    beta=120.0,
+    gamma=-10.0,
+    exponent=1.6,
+)
+
+
+def of_branches(count: int) -> tuple[pt.Dataset, pt.Dataset]:
+    """A triangle whose amplitude falls, with noise of 0.1 % of the stroke; another motion."""
+    t = np.linspace(0.0, 10.0, count)
+    tops = np.linspace(1.0, 0.1, 14) * np.tile([60.0, -60.0], 7)
+    falling = np.interp(t, np.linspace(0.0, 10.0, 15), [0.0, *tops])
+    other = 30.0 * np.sin(8.2 * t) * (1.0 + 0.5 * np.sin(1.9 * t))
+    x, y = (BRANCHES.simulate(u, t[1]).x for u in (falling, other))
+    x += 1e-3 * np.ptp(x) * np.random.default_rng(1).normal(size=count)
+    return pt.Dataset(u=falling, y=x, t=t), pt.Dataset(u=other, y=y, t=t)
+
+
 def record(stage: pt.stages.Stage, noise: float) -> pt.Dataset:
     x = stage.simulate(U, DT, initial=stage.equilibrium(U[0])).x
     return pt.Dataset(u=U, y=x + noise * np.random.default_rng(0).normal(size=x.size), dt=DT)
@@ -100,6 +123,24 @@ def test_smooth_tips_are_told_from_plays(tmp_path: Path) -> None:
     document = json.loads(fit.save(tmp_path / "model.json").read_text(encoding="utf-8"))
     assert document["selection"]["models"].keys() == set(tried(fit))
     assert pt.load(tmp_path / "model.json").model == fit.model
+
+
+def test_branches_that_plays_describe_only_in_the_record_are_searched() -> None:
+    """Plays leave 1.4 times the noise, and 0.3 % of the stroke of another motion."""
+    log, other = of_branches(2500)
+    fit = pt.identify(log, progress=False)
+    assert fit.model.info.name == "bouc-wen"
+    assert fit.cost_percent < 0.101
+    assert fit.model.exponent == pytest.approx(1.6, rel=0.05)
+    assert fit.score(other).rms < 2e-4 * log.stroke
+
+
+def test_an_exponent_is_found_in_a_long_record_of_a_triangle() -> None:
+    """Its turns lie between the samples that are kept of it."""
+    log, other = of_branches(7000)
+    fit = pt.identify(log, "bouc-wen", progress=False)
+    assert fit.model.exponent == pytest.approx(1.6, rel=0.03)
+    assert fit.score(other).rms < 2e-4 * log.stroke
 
 
 def test_a_record_of_one_loop_is_judged_on_its_last_quarter() -> None:

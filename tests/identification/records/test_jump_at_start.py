@@ -67,9 +67,7 @@ def test_a_jump_is_found_in_a_long_record_of_noise() -> None:
     x = STAGE.simulate(np.concatenate(([0.0], u)), DT, hold="zoh").x[1:]
     noise = 1.2e-6
     y = x + noise * np.random.default_rng(0).normal(size=u.size)
-    fit = pt.identify(
-        pt.Dataset(u=u, y=y, dt=DT, hold="zoh"), "prandtl-ishlinskii", progress=False
-    )
+    fit = pt.identify(pt.Dataset(u=u, y=y, dt=DT, hold="zoh"), "prandtl-ishlinskii", progress=False)
     assert fit.start is not None
     assert fit.start.history == "rest"
     assert fit.cost < 1.01 * noise

@@ -53,8 +53,8 @@ def with_rest_tried(problem: Problem, fit: Identification, identify: Identify) -
     Returns
     -------
     Identification
-        The one with the jump where it lowers the residual by 2 %: its window begins at the second
-        sample, as the jump lies at the first.
+        The one with the jump where it lowers the residual by 2 %, and that after the first sample
+        too: its window begins at the second sample, as the jump lies at the first.
     """
     (record,) = problem.records
     data = record.data
@@ -63,8 +63,10 @@ def with_rest_tried(problem: Problem, fit: Identification, identify: Identify) -
     if not carried_by_first_samples(_left(fit, data), fit.noises[0]):
         return fit
     jumped = with_rest(problem, identify)
-    before = float(np.sqrt(np.mean(_left(fit, jumped.data) ** 2)))
-    return jumped if jumped.cost < (1.0 - GAIN) * before else fit
+    later = float(np.sqrt(np.mean(_left(fit, jumped.data) ** 2)))
+    # The first sample, where the jump lies, may be all that it explains.
+    explains = jumped.cost < min(later, (1.0 - GAIN) * fit.cost)
+    return jumped if explains else fit
 
 
 def voltage_of_rest(fit: Identification) -> float | None:

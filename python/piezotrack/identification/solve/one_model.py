@@ -78,7 +78,9 @@ def identify_model(
         if rest is not None or any(record.history == "rest" for record in other.records):
             return with_rest(other, plain, rest)
         fit = plain(other)
-        return with_rest_tried(other, fit, plain) if len(other.records) == 1 else fit
+        # What is worse than another model without a jump lacks more than that.
+        worse = start is not None and fit.cost > start.cost
+        return fit if worse or len(other.records) > 1 else with_rest_tried(other, fit, plain)
 
     return with_delay_tried(problem, method, start, rest, identify)
 

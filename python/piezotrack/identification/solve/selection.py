@@ -50,6 +50,9 @@ LEAST_SQUARES = (
     "duhem",
 )
 SEARCHED = ("first-order-dahl", "parallel-dahl", "bouc-wen")
+# Of these, the one that predicts other motions where plays describe only the record: tried unless
+# those leave nothing but noise.
+OTHERWISE = "bouc-wen"
 # Models that contain another one, whose search costs less: tried where it is near the best.
 CONTAINED = {"parallel-dahl": "first-order-dahl"}
 NEAR_BEST = 1.5
@@ -57,7 +60,7 @@ OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
 # A residual of so many times the noise has nothing but noise in it: no further model is tried or
 # searched, and a fit to whole records is not made anew. One of so many times, on what was not
 # fitted, is good enough to search none.
-NOTHING_BUT_NOISE, NEAR_NOISE = 1.2, 2.0
+HARDLY_MORE, NOTHING_BUT_NOISE, NEAR_NOISE = 1.05, 1.2, 2.0
 # Another model has to be better by this share than one before it in the list; where the record
 # has one loop, on which all are judged that were fitted to it, by more.
 BETTER, BETTER_ON_ONE_LOOP = 0.03, 0.1
@@ -108,8 +111,8 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     shares = Parts([*(SLOWER if info.searched else 1.0 for info in infos), 1.0])
     with trials.side_by_side([info for info in infos if not info.searched]):
         for i, info in enumerate(infos):
-            if info.searched and (trials.least < NEAR_NOISE or trials.fitted < NOTHING_BUT_NOISE):
-                break
+            if info.searched and not trials.worth_searching(info.name):
+                continue
             if not trials.near_best(CONTAINED.get(info.name)):
                 continue
             with shares.begin(i):
@@ -131,6 +134,14 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     with shares.begin(len(infos)):
         fit = whole(best, best.start)
         noise = max(noise_of(record.data) for record in problem.records)
+        one = trials.otherwise(best)
+        if one is not None and fit.cost > HARDLY_MORE * min(fit.noises):
+            # Few parameters that describe the whole record as well as many weights predict more.
+            with suppress(DataError, NumericalError):
+                of_model = _as_shown(problem, Structure.of(fit)).of_model(one.info)
+                other = identify_model(of_model, methods.method(one.info), run)
+                if other.cost < (1.0 - BETTER) * fit.cost:
+                    best, fit = one, other
         if best.info.name == MANY_WEIGHTS or fit.cost > NOTHING_BUT_NOISE * noise:
             # The first part does not show all that the whole record does.
             least = (1.0 - BETTER_ON_WHOLE) * fit.cost
@@ -199,16 +210,25 @@ class _Trials:
         rms = {tried.info.name: tried.trial.rms for tried in self.found}
         return name not in rms or rms[name] <= NEAR_BEST * min(rms.values())
 
+    def worth_searching(self, name: str) -> bool:
+        """Return whether a model that is searched may be better than what was found so far."""
+        near = self.least < NEAR_NOISE or self.fitted < NOTHING_BUT_NOISE
+        return self.least > NOTHING_BUT_NOISE and (name == OTHERWISE or not near)
+
     def whole(self, problem: Problem, info: ModelInfo) -> Problem:
         """Return the problem of a model on the whole records, with the delays that were shown."""
         shown = any(self.delayed) and not info.searched
         return self.of_model(_with_delays(problem, self.delayed) if shown else problem, info)
 
     def of_model(self, problem: Problem, info: ModelInfo) -> Problem:
-        """Return the problem of a model; searched ones creep as least squares have shown."""
-        if info.searched and problem.creep is None and self.start and self.start.creep_times:
-            problem = replace(problem, creep=tuple(self.start.creep_times))
-        return problem.of_model(info)
+        """Return the problem of a model; what least squares have shown is in searched ones too."""
+        return (_as_shown(problem, self.start) if info.searched else problem).of_model(info)
+
+    def otherwise(self, best: Tried) -> Tried | None:
+        """Return the trial of the model that is searched beside plays where it comes near them."""
+        if best.info.searched or self.least <= NOTHING_BUT_NOISE or not self.near_best(OTHERWISE):
+            return None
+        return next((one for one in self.found if one.info.name == OTHERWISE), None)
 
     def others(self, best: Tried) -> list[Tried]:
         """Return the models that are fitted to the whole records beside the best one."""
@@ -299,6 +319,19 @@ def _with_delays(problem: Problem, shown: list[bool]) -> Problem:
     records = tuple(
         replace(record, delay=delayed) if record.delay is None else record
         for record, delayed in zip(problem.records, shown, strict=True)
+    )
+    return replace(problem, records=records)
+
+
+def _as_shown(problem: Problem, start: Structure | None) -> Problem:
+    """Return a problem with the creep and the drifts of a fit where nothing is said of them."""
+    if start is None:
+        return problem
+    if problem.creep is None and start.creep_times:
+        problem = replace(problem, creep=tuple(start.creep_times))
+    records = tuple(
+        replace(record, drift=True) if record.drift is None and time is not None else record
+        for record, time in zip(problem.records, start.drifts, strict=True)
     )
     return replace(problem, records=records)
 

@@ -55,6 +55,8 @@ class Structure:
     drifts: list[float | None]
     creep_times: list[float]
     dynamics: list[float]
+    # Residual that the other fit leaves [m].
+    cost: float
     # Whether that fit is kept, and not only judged beside others.
     kept: bool = False
 
@@ -75,6 +77,7 @@ class Structure:
             drifts=[one.drift.time if one.drift else None for one in fit.records],
             creep_times=[time for weight, time in creep if weight > 0.0],
             dynamics=[*(one for one in main if one is not None), *chain(*modes)],
+            cost=fit.cost,
             kept=kept,
         )
 

@@ -22,8 +22,8 @@ __all__ = ["with_delay_tried"]
 # Share of the cost that a delay has to take away: creep and a lag turn the phase as it does.
 GAIN = 0.05
 # A residual of so many times the noise has hardly anything but noise in it; up to so many times, a
-# delay changes its structure little.
-NOISY, NEAR = 1.05, 1.5
+# delay changes its structure little, and beyond, where it takes away such a share within it.
+NOISY, NEAR, SIGN = 1.05, 1.5, 0.01
 
 
 def with_delay_tried(
@@ -64,10 +64,10 @@ def with_delay_tried(
     delayed, rest = replace(problem, records=records), voltage_of_rest(fit)
     least = (1.0 - GAIN) * fit.cost
     try:
-        resumes = start is not None or fit.cost < NEAR * noise
         kept = start is not None and start.kept
-        late = identify(delayed, Structure.of(fit, kept=kept) if resumes else None, rest)
-        if resumes and start is None and late.cost < least:
+        late = identify(delayed, Structure.of(fit, kept=kept), rest)
+        shown = least if fit.cost < NEAR * noise else (1.0 - SIGN) * fit.cost
+        if start is None and late.cost < shown:
             late = min(late, identify(delayed, None, rest), key=lambda one: one.cost)
     except (DataError, NumericalError):
         return fit

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 __all__ = ["with_exponent_tried"]
 
 MODEL, NAME = "bouc-wen", "exponent"
-# Range of the exponent, and the factor from one to the next.
-LEAST, MOST, STEP = 1.2, 4.5, 1.15
+# Largest exponent, and the factor from one to the next.
+MOST, STEP = 4.5, 1.15
 # Factor beside the best one of a thinned record with which it is found in the whole record, and how
 # often it is applied at most.
 BESIDE, MOST_BESIDE = 1.03, 8
@@ -38,9 +38,11 @@ BESIDE, MOST_BESIDE = 1.03, 8
 NOISY = 1.05
 # Parameters whose unit the exponent decides.
 DECAYS = ("beta", "gamma")
-# Most samples of a record, of one that is thinned, and fewest; and the distance of the drive from
-# straight lines between those that are kept, as a share of its range.
-MOST_SAMPLES, MOST_THINNED, FEWEST, OFF = 20_000, 6000, 500, 1e-4
+# Most samples of a record, of one that cannot be thinned, and of one that is, and fewest; and the
+# distance of the drive from straight lines between those that are kept, as a share of its range,
+# and where they are too many.
+MOST_SAMPLES, MOST_WHOLE, MOST_THINNED, FEWEST = 20_000, 6000, 2000, 500
+OFF, MOST_OFF = 1e-4, 1e-2
 # Share of a parameter within which the last search stays, and by how much its cost may be above
 # that of the profile.
 NEAR, WORSE = 0.5, 0.02
@@ -109,23 +111,28 @@ def _is_free(problem: Problem) -> bool:
 
 def _thinned(data: Dataset) -> Dataset | None:
     """Keep every so many of the samples, as straight lines between them allow; None of too many."""
-    u, swing = data.full.u, float(np.ptp(data.full.u))
-    if len(u) > MOST_SAMPLES or data.left_out is not None:
-        return data if len(u) <= MOST_THINNED else None
-    places = np.arange(u.size)
-    every = 1
-    while data.hold == "foh" and u.size // (every + 1) >= FEWEST:
-        kept = np.interp(places, places[:: every + 1], u[:: every + 1])
-        if float(np.abs(kept - u)[: u.size - every - 1].max()) > OFF * swing:
-            break
-        every += 1
-    if u.size // every > MOST_THINNED:
-        return None
-    if every == 1:
-        return data
+    u = data.full.u
+    if len(u) > MOST_SAMPLES or data.left_out is not None or data.hold != "foh":
+        return data if len(u) <= MOST_WHOLE else None
+    every = len(u) // FEWEST
+    while every > 1 and _off(u, every) > OFF:
+        every -= 1
+    # A turn of the drive between samples that are kept costs little beside the time of more.
+    fewer = -(-len(u) // MOST_THINNED)
+    if fewer > every and _off(u, fewer) <= MOST_OFF:
+        every = fewer
+    if every <= 1:
+        return data if len(u) <= MOST_WHOLE else None
     full = data.full
     thin = Dataset(u=u[::every], y=full.y[::every], t=full.t[::every], drive_unit=data.drive_unit)
     return thin[float(thin.t[-(-data.warmup // every)]) :]
+
+
+def _off(u: Array, every: int) -> float:
+    """Return how far a drive is from straight lines between every so many of its samples."""
+    places = np.arange(u.size)
+    between = np.interp(places, places[::every], u[::every])[: u.size - every]
+    return float(np.abs(between - u[: u.size - every]).max()) / float(np.ptp(u))
 
 
 class _Profile:
@@ -144,15 +151,16 @@ class _Profile:
 
     def best(self) -> float:
         """Find the best exponent; return its cost."""
-        n = LEAST
-        before = self.descend(1.0, n)
-        if not before < self.costs[1.0]:
-            return before
-        while n * STEP <= MOST:
-            cost = self.descend(n, n * STEP)
-            if not cost < before:
+        n, before, step = 1.0, self.costs[1.0], STEP
+        while n * step <= MOST:
+            cost = self.descend(n, n * step)
+            if cost < before:
+                n, before = n * step, cost
+            elif step < STEP:
                 break
-            n, before = n * STEP, cost
+            else:
+                # A descent from too far may end in another minimum.
+                step = math.sqrt(STEP)
         self.n = self.vertex(n)
         return self.costs[self.n]
 
@@ -164,7 +172,7 @@ class _Profile:
         for _ in range(MOST_BESIDE):
             n = min(self.costs, key=self.costs.__getitem__)
             beyond = n * BESIDE if n == max(self.costs) else n / BESIDE
-            if min(self.costs) < n < max(self.costs) or not LEAST < beyond < MOST:
+            if min(self.costs) < n < max(self.costs) or not 1.0 < beyond < MOST:
                 break
             self.descend(n, beyond)
         self.n = self.vertex(n)
