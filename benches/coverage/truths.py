@@ -222,12 +222,12 @@ def searched() -> dict[str, Case]:
     few = pt.Descents(samples=4, starts=4, rounds=1)
     known = held(*bristles, "stribeck_velocity", stage=lugre, viscous_friction=0.0)
     paper = pt.DahlStage.xu_li_2010()
+    forces = held(stiffness=paper.stiffness, mass=paper.mass)
     return {
         "Dahl": Case("dahl", dahl, held(stiffness=dahl.stiffness, mass=dahl.mass)),
         "Dahl, mass not shown": Case("dahl", dahl, held(stiffness=dahl.stiffness)),
-        "Dahl of the paper": Case(
-            "dahl", paper, held(stiffness=paper.stiffness, mass=paper.mass), irregular=True
-        ),
+        "Dahl, a2 not shown": Case("dahl", replace(paper, a2=8e6), forces),
+        "Dahl of the paper": Case("dahl", paper, forces, irregular=True),
         "first-order Dahl": Case("first-order-dahl", first, held()),
         "parallel Dahl": Case(
             "parallel-dahl", parallel, held(*strands, "yield_path", "path_ratio", stage=parallel)

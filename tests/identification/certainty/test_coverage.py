@@ -102,6 +102,24 @@ def test_intervals_allow_for_a_weight_of_creep_on_its_bound() -> None:
     assert beyond < 2.5 * certainty.deviations[k]
 
 
+def test_intervals_allow_for_a_value_of_a_search_on_its_bound() -> None:
+    """Where a2 ends there, which the record hardly shows, the others make up for it."""
+    case = TRUTHS.CASES["Dahl, a2 not shown"]
+    u, rng = case.drive(), np.random.default_rng(1)
+    clean = TRUTHS.motion(case.stage, u, case.dt)
+    fits = [case.fit(u, clean + case.noise * rng.standard_normal(u.size)) for _ in range(8)]
+    errors, reaches, covered = [], [], []
+    for certainty in [fit.covariance for fit in fits if fit.parameters["a2"].at_bound]:
+        for k, name in enumerate(certainty.names):
+            low, high = certainty.interval(name)
+            errors.append(abs(certainty.values[k] - CELLS.value_of(case.stage, name)))
+            reaches.append(1.96 * certainty.widening[k] * np.sqrt(certainty.matrix[k, k]))
+            covered.append(low < CELLS.value_of(case.stage, name) < high)
+    assert len(errors) > 10
+    assert np.mean(np.less(errors, reaches)) < 0.5
+    assert np.mean(covered) > 0.9
+
+
 def test_deviations_of_what_follows_from_other_values_are_those_of_the_estimates() -> None:
     # Thresholds of the drive stay, and the displacements at which elements slip follow.
     values = CELLS.measured("Maxwell slip", "white", 30)["values"]

@@ -12,12 +12,12 @@ import numpy as np
 
 from ... import _core
 from ...errors import DataError, PiezotrackError
-from ..fitted.certainty.covariance import Covariance, NoiseShares, is_hidden
+from ..fitted.certainty.covariance import Covariance, NoiseShares, is_hidden, left_open
 from ..solve.judging import SAME_PERIOD, period_of
 from ..solve.search import details_of
 from .held_out import held_out
-from .sensitivity import LinearisedRecord, gradient, sensitivity
-from .values import DELAY, Value, entries_of, fitted_values, moved, sizes_of
+from .sensitivity import STEP, LinearisedRecord, gradient, sensitivity
+from .values import DELAY, Value, entries_of, fitted_values, free_values, moved, sizes_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -259,7 +259,7 @@ def _covariance(
         widening=np.maximum(quantiles / NormalDist().inv_cdf(0.5 + 0.5 * LEVEL), 1.0),
         shifts=np.array(shifts) * sizes[:, None],
         to_least_cost=sizes * (np.array(steps) if aside else 0.0),
-        by_held=_by_held(model, records, at, sizes, np.array(steps)),
+        by_held=_by_held(model, records, at, sizes, (np.array(steps), np.sqrt(np.diag(rows)))),
         samples=sum(record.samples for record in linear),
         orders=tuple(orders),
         hidden=np.array(hidden).reshape(-1, sizes.size) * sizes,
@@ -269,40 +269,63 @@ def _covariance(
 
 
 def _by_held(
-    model: IdentifiedModel, records: Records, at: list[Sensitivity], sizes: Array, steps: Array
-) -> Array:
-    """Return `Covariance.by_held`: of several values that are held, of the likeliest above 0."""
-    freed = [_freed(value, model, records, at, sizes) for value in _held(model)]
-    shown = [one for one in freed if one is not None]
-    if not shown:
-        return np.zeros((steps.size, 2))
-    ratio, found = max(shown, key=lambda one: one[0])
-    changes = sizes * (found - steps)
-    return np.outer(changes / ratio, [min(ratio, MOST_HELD), 1.0])
-
-
-def _held(model: IdentifiedModel) -> list[Value]:
-    """Values that are held at 0: a mass without effect, weights of creep on their bound."""
-    mass = getattr(model, "parameters", {}).get("mass")
-    is_held = mass is not None and not mass.free and mass.deviation is not None
-    free = entries_of(model).get("creep_weights", {}).get("free", False)
-    weights = model.model.creep_weights if free else ()
-    creep = [Value("creep_weights", k) for k, weight in enumerate(weights) if weight == 0.0]
-    return [Value("mass"), *creep] if is_held else creep
-
-
-def _freed(
-    value: Value,
     model: IdentifiedModel,
     records: Records,
     at: list[Sensitivity],
     sizes: Array,
-) -> tuple[float, Array] | None:
-    """Fit a value that is held too: its best one in its deviations, and the steps of the others."""
+    found: tuple[Array, Array],
+) -> Array:
+    """Return `Covariance.by_held`: of several values, of the one that leaves the others most open.
+
+    `found`: steps to the least cost, and standard deviations, both in sizes.
+    """
+    steps, own = found
+    freed = [np.zeros((steps.size, 2))]
+    for value, step in _held(model):
+        ratio, free = _freed(value, step, model, records, at, sizes)
+        if ratio != 0.0:
+            freed.append(np.outer((free - steps) / ratio, [min(ratio, MOST_HELD), 1.0]))
+    shares = np.divide(1.0, own, out=np.zeros_like(own), where=own > 0.0)
+    most = max(freed, key=lambda one: float(np.linalg.norm(shares * left_open(one))))
+    return sizes[:, None] * most
+
+
+def _held(model: IdentifiedModel) -> list[tuple[Value, float]]:
+    """List what is held, with a step to where it may be.
+
+    A mass without effect, weights of creep at 0, and what a search ended with on a bound.
+    """
+    entries = entries_of(model)
+    mass = getattr(model, "parameters", {}).get("mass")
+    values = [Value("mass")] if mass is not None and not mass.free and mass.deviation else []
+    free = entries.get("creep_weights", {}).get("free", False)
+    weights = model.model.creep_weights if free else ()
+    values += [Value("creep_weights", k) for k, weight in enumerate(weights) if weight == 0.0]
     # The step of `sensitivity`, in a mass without effect, is one of rounding.
-    other = moved(model, [value], sizes_of(model, [value], records[0][0].dt))
+    held = [(value, value.size_in(model)) for value in values]
+    bounded = {name: one["bounds"] for name, one in entries.items() if one.get("at_bound", False)}
+    for value in free_values(model.model, bounded):
+        low, high = bounded[value.parameter]
+        held.append((value, STEP * (low + high - 2.0 * value.of(model))))
+    return held
+
+
+def _freed(
+    value: Value,
+    step: float,
+    model: IdentifiedModel,
+    records: Records,
+    at: list[Sensitivity],
+    sizes: Array,
+) -> tuple[float, Array]:
+    """Fit a value that is held too: its best one in its deviations, and the steps of the others.
+
+    0 deviations where it has no effect of its own.
+    """
+    none = 0.0, np.zeros(sizes.size)
+    other = moved(model, [value], np.array([step]))
     if other is None:
-        return None
+        return none
     known = [LinearisedRecord(model, data) for data, _ in records]
     extended = [
         _Linear(
@@ -317,8 +340,8 @@ def _freed(
     matrix, determined, _, _, found, *_ = _core.linearised_covariance(
         [record.thinned(MOST) for record in extended], np.diag(precision).tolist(), 0, SEED
     )
-    if not determined[-1] or found[-1] == 0.0:
-        return None
+    if not determined[-1]:
+        return none
     return found[-1] / math.sqrt(matrix[-1][-1]), np.array(found[:-1])
 
 

@@ -28,6 +28,7 @@ __all__ = [
     "covariance_entry",
     "covariance_of_file",
     "is_hidden",
+    "left_open",
     "normal_reach",
 ]
 
@@ -117,10 +118,11 @@ class Covariance:
         Change of each value to where the cost is least, which an interval includes: not 0 where the
         fit has the shortest lag that fits as well (`Identification.lags`).
     by_held : ndarray, shape (p, 2)
-        What a value held at 0, as the records do not show it, would change each value by: a mass,
-        or a weight of creep on its bound. Its value of least cost, of five standard deviations at
-        most, and one standard deviation. An interval reaches as far as that of the fit with it, on
-        the side to which it moves the value. 0 where none was held; of several the likeliest.
+        What a value that was held would change each value by: a mass that the records do not show,
+        or a value on its bound. Its value of least cost, of five standard deviations at most, and
+        one standard deviation. An interval reaches as far as that of the fit with it, on the side
+        to which it moves the value. 0 where none was held; of several the one that leaves the
+        others most open.
     samples : int
         Samples of the records.
     orders : tuple of int
@@ -172,13 +174,10 @@ class Covariance:
     def deviations(self) -> Array:
         """Standard deviations, SI, shape (p,); infinite where a value is not determined.
 
-        With what a value leaves open that was held at 0 (`by_held`), which the matrix has not.
+        With what a value leaves open that was held (`by_held`), which the matrix has not.
         """
-        moved, spread = self.by_held.T
-        # Root mean square of what a value above 0 moves, within a tenth.
-        by_held = 0.5 * (np.hypot(moved, 2.0 * spread) + moved * np.sign(spread))
         own = np.sqrt(np.diag(self.matrix))
-        return np.where(self.determined, np.hypot(own, by_held), np.inf)
+        return np.where(self.determined, np.hypot(own, left_open(self.by_held)), np.inf)
 
     @property
     def effective_samples(self) -> Array:
@@ -320,6 +319,23 @@ def _further(normal: float, deviation: float, moved: float, spread: float) -> fl
     """How much further an interval reaches by a value that was held, to the side of its effect."""
     more = moved * math.copysign(1.0, spread) + normal * (math.hypot(deviation, spread) - deviation)
     return math.copysign(max(more, 0.0), spread)
+
+
+def left_open(by_held: Array) -> Array:
+    """Return the root mean square of what a value that was held would move others by.
+
+    Parameters
+    ----------
+    by_held : ndarray, shape (p, 2)
+        As `Covariance.by_held`.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        Of values on their side of where it was held, within a tenth.
+    """
+    moved, spread = by_held.T
+    return np.asarray(0.5 * (np.hypot(moved, 2.0 * spread) + moved * np.sign(spread)))
 
 
 def is_hidden(hidden: Array, gradient: Array) -> bool:
