@@ -55,8 +55,8 @@ class Structure:
     drifts: list[float | None]
     creep_times: list[float]
     dynamics: list[float]
-    # Residual that the other fit leaves [m].
-    cost: float
+    # Residual that the other fit leaves without a jump of the drive to the first sample [m].
+    cost: float = math.inf
     # Whether that fit is kept, and not only judged beside others.
     kept: bool = False
 
@@ -68,6 +68,7 @@ class Structure:
         modes = zip(
             model.mode_weights, model.mode_frequencies, model.mode_damping_ratios, strict=True
         )
+        jumped = any(one.start and one.start.history == "rest" for one in fit.records)
         main = (model.time_constant, model.frequency, model.damping_ratio)
         return cls(
             histories=[
@@ -77,7 +78,7 @@ class Structure:
             drifts=[one.drift.time if one.drift else None for one in fit.records],
             creep_times=[time for weight, time in creep if weight > 0.0],
             dynamics=[*(one for one in main if one is not None), *chain(*modes)],
-            cost=fit.cost,
+            cost=math.inf if jumped else fit.cost,
             kept=kept,
         )
 
