@@ -10,6 +10,11 @@ import pytest
 import piezotrack as pt
 from piezotrack.identification.fitted.notes import start_notes
 from piezotrack.identification.fitted.start import Start
+from piezotrack.identification.problem.problem import Problem
+from piezotrack.identification.problem.records import Record
+from piezotrack.identification.solve.one_model import identify_model
+from piezotrack.identification.solve.run import Run
+from piezotrack.identification.solve.weights import Structure
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -71,6 +76,22 @@ def test_a_jump_is_found_in_a_long_record_of_noise() -> None:
     assert fit.start is not None
     assert fit.start.history == "rest"
     assert fit.cost < 1.01 * noise
+
+
+def test_a_jump_is_tried_beside_a_model_that_has_one() -> None:
+    """Without a jump, any model is worse than another that has it."""
+    log, method = jumping(), pt.LeastSquares()
+    (jumped, still) = (
+        pt.identify(log, "prandtl-ishlinskii", history=history, progress=False)
+        for history in (None, "virgin")
+    )
+    problem = Problem(model="polynomial-prandtl-ishlinskii", records=(Record(log, delay=False),))
+    run = Run(progress=False)
+    assert jumped.cost < 0.1 * still.cost
+    fit = identify_model(problem, method, run, Structure.of(jumped))
+    assert fit.start is not None
+    assert fit.start.history == "rest"
+    assert fit.cost < 1.2 * NOISE
 
 
 def test_the_voltage_of_rest_is_found() -> None:
