@@ -168,7 +168,7 @@ class _Profile:
         """Find the best exponent of the whole record beside that of the thinned one."""
         n, self.problem, self.costs = self.n, problem, {}
         for at in (n, n / BESIDE, n * BESIDE):
-            self.descend(n, min(at, MOST))
+            self.descend(n, min(max(at, 1.0), MOST))
         for _ in range(MOST_BESIDE):
             n = min(self.costs, key=self.costs.__getitem__)
             beyond = n * BESIDE if n == max(self.costs) else n / BESIDE
