@@ -41,8 +41,8 @@ VISCOUS = 0.02
 LARGE = 0.05
 # Share of the window that the first samples may be, and of the squared residual that they carry.
 FIRST, CARRIED = 0.1, 0.5
-# Share of the squared residual without which its root hardly differs.
-MATTERS = 0.04
+# Those that a jump moves, and share of the squared residual without which its root hardly differs.
+VERY_FIRST, MATTERS = 0.01, 0.04
 # Margin of the drive's range, and factor of its rate, beyond which a model was not fitted.
 MARGIN, FASTER = 0.01, 2.0
 # Share of the drive's range up to which its step to the first sample is none to speak of.
@@ -282,27 +282,29 @@ def lag_notes(lags: LagRange | None, frequency: float, lag: float | None = None)
 
 
 def carried_by_first_samples(rest: Array, noise: float) -> bool:
-    """Return whether the first tenth of a residual carries more than half of it.
+    """Return whether the first tenth of a residual carries half of it, or its very first samples.
 
     Parameters
     ----------
     rest : ndarray, shape (n,)
         Residual in the window [m].
     noise : float
-        Standard deviation of the noise, whose squares do not count [m].
+        Standard deviation of the noise [m].
 
     Returns
     -------
     bool
-        False also where the squares of the first tenth are too few to matter.
+        True also where the first hundredth carries half of the squares above those of the noise,
+        and so many of all that their root differs.
     """
-    squares = (rest - rest.mean()) ** 2
-    above = np.cumsum(squares - noise**2)
-    count = math.floor(FIRST * rest.size)
+    squares = np.cumsum((rest - rest.mean()) ** 2)
+    count, few = math.floor(FIRST * rest.size), math.ceil(VERY_FIRST * rest.size)
     if count == 0:
         return False
-    least = max(CARRIED * above[-1], MATTERS * squares.sum())
-    return bool(above[count - 1] > 0.0 and above[count - 1] >= least)
+    above = squares[-1] - rest.size * noise**2
+    least = max(CARRIED * above, MATTERS * squares[-1])
+    by_few = squares[few - 1] - few * noise**2 >= least > 0.0
+    return bool(by_few or squares[count - 1] >= CARRIED * squares[-1] > 0.0)
 
 
 def first_samples(rest: Array, data: Dataset, noise: float) -> list[str]:
