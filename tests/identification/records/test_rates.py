@@ -88,8 +88,8 @@ def test_use_beyond_the_record_is_remarked() -> None:
 def test_first_samples_that_carry_the_cost_are_named() -> None:
     rest = np.full(len(SLOW), 1e-9)
     rest[::2] *= -1.0
-    assert fit_notes.first_samples(rest, SLOW, 0.0) == []
+    assert fit_notes.first_samples(rest, SLOW) == []
     rest[:50] += 1e-6 * np.exp(-np.arange(50) / 10.0)
-    (note,) = fit_notes.first_samples(rest, SLOW, 1e-9)
+    (note,) = fit_notes.first_samples(rest, SLOW)
     assert "of the squared residual is in the first 0.0" in note
     assert "log[1.0" in note

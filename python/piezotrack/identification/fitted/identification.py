@@ -260,7 +260,6 @@ class Identification(IdentifiedModel):
                 "first sampling interval, not of the sensor"
             )
         notes += self.model._notes(lambda: run)
-        noise = min(sample_noise(measured.y), sample_noise(rest))
         lines = hum_lines(rest, measured.u, measured.y, measured.dt)
         notes += hum_notes(lines)
         if self.selection:
@@ -268,8 +267,8 @@ class Identification(IdentifiedModel):
             without_hum = (
                 math.sqrt(max(record.cost**2 - power_of(lines), 0.0)) if lines else record.cost
             )
-            notes += above_noise(without_hum, noise)
-        return notes + first_samples(rest, measured, noise)
+            notes += above_noise(without_hum, min(sample_noise(measured.y), sample_noise(rest)))
+        return notes + first_samples(rest, measured)
 
     @property
     def success(self) -> bool:

@@ -41,8 +41,6 @@ VISCOUS = 0.02
 LARGE = 0.05
 # Share of the window that the first samples may be, and of the squared residual that they carry.
 FIRST, CARRIED = 0.1, 0.5
-# Those that a jump moves, and share of the squared residual without which its root hardly differs.
-VERY_FIRST, MATTERS = 0.01, 0.04
 # Margin of the drive's range, and factor of its rate, beyond which a model was not fitted.
 MARGIN, FASTER = 0.01, 2.0
 # Share of the drive's range up to which its step to the first sample is none to speak of.
@@ -281,33 +279,14 @@ def lag_notes(lags: LagRange | None, frequency: float, lag: float | None = None)
     ]
 
 
-def carried_by_first_samples(rest: Array, noise: float) -> bool:
-    """Return whether the first tenth of a residual carries half of it, or its very first samples.
-
-    Parameters
-    ----------
-    rest : ndarray, shape (n,)
-        Residual in the window [m].
-    noise : float
-        Standard deviation of the noise [m].
-
-    Returns
-    -------
-    bool
-        True also where the first hundredth carries half of the squares above those of the noise,
-        and so many of all that their root differs.
-    """
-    squares = np.cumsum((rest - rest.mean()) ** 2)
-    count, few = math.floor(FIRST * rest.size), math.ceil(VERY_FIRST * rest.size)
-    if count == 0:
-        return False
-    above = squares[-1] - rest.size * noise**2
-    least = max(CARRIED * above, MATTERS * squares[-1])
-    by_few = squares[few - 1] - few * noise**2 >= least > 0.0
-    return bool(by_few or squares[count - 1] >= CARRIED * squares[-1] > 0.0)
+def carried_by_first_samples(rest: Array) -> bool:
+    """Return whether the first tenth of a residual carries more than half of its squares."""
+    squares = (rest - rest.mean()) ** 2
+    count = math.floor(FIRST * rest.size)
+    return count > 0 and bool(squares[:count].sum() >= CARRIED * squares.sum())
 
 
-def first_samples(rest: Array, data: Dataset, noise: float) -> list[str]:
+def first_samples(rest: Array, data: Dataset) -> list[str]:
     """Say that the first samples carry the cost.
 
     Parameters
@@ -316,18 +295,16 @@ def first_samples(rest: Array, data: Dataset, noise: float) -> list[str]:
         Residual in the window [m].
     data : Dataset
         The record.
-    noise : float
-        Standard deviation of the noise [m].
 
     Returns
     -------
     list of str
         One sentence with the seconds to leave out, or none.
     """
-    if not carried_by_first_samples(rest, noise):
-        return []
     squares = np.cumsum((rest - rest.mean()) ** 2)
     count = math.floor(FIRST * rest.size)
+    if squares[-1] == 0.0 or not carried_by_first_samples(rest):
+        return []
     # As far as the residual is well above that of the rest.
     later = (squares[-1] - squares[count - 1]) / (rest.size - count)
     above = np.flatnonzero((rest[:count] - rest.mean()) ** 2 > 4.0 * later)

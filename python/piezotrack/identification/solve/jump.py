@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -36,6 +37,8 @@ FIRST = 1500
 ALIKE, TRIED, APART = 1.1, 3, 1.5
 # Fits with a voltage of rest that was found from the one before, at most.
 ROUNDS = 3
+# Share of the window in which a jump is over, and of the squares above the noise that are there.
+VERY_FIRST, CARRIED = 0.01, 0.5
 
 
 def with_rest_tried(problem: Problem, fit: Identification, identify: Identify) -> Identification:
@@ -60,7 +63,7 @@ def with_rest_tried(problem: Problem, fit: Identification, identify: Identify) -
     data = record.data
     if record.history is not None or data.warmup:
         return fit
-    if not carried_by_first_samples(_left(fit, data), fit.noises[0]):
+    if not _begins_apart(fit, data):
         return fit
     jumped = with_rest(problem, identify)
     later = float(np.sqrt(np.mean(_left(fit, jumped.data) ** 2)))
@@ -105,7 +108,7 @@ def with_rest(problem: Problem, identify: Identify, known: float | None = None) 
         raise ParameterError("history", "'rest'", "another one of several records")
     data = problem.records[0].data
     fit = _at_rest(problem, identify, 0.0 if known is None else known)
-    if known is None and carried_by_first_samples(_left(fit, fit.data), fit.noises[0]):
+    if known is None and _begins_apart(fit, fit.data):
         begun = _begun(problem)
         start = Structure.of(fit) if isinstance(fit.method, LeastSquares) else None
         costs: dict[float, float] = {}
@@ -161,6 +164,17 @@ def best_voltage(fit: Identification, data: Dataset) -> float | None:
     first = _first(data)
     volts = least_voltage(lambda volts: cost(volts, first), _voltages(data))
     return volts if cost(volts) < (1.0 - GAIN) * cost(voltage_of_rest(fit) or 0.0) else None
+
+
+def _begins_apart(fit: Identification, data: Dataset) -> bool:
+    """Return whether the first samples carry the residual, or the very first what is not noise."""
+    left = _left(fit, data)
+    squares = (left - left.mean()) ** 2
+    above = squares - fit.noises[0] ** 2
+    count = math.ceil(VERY_FIRST * left.size)
+    # Fewer do not lower the residual by the share that is required.
+    least = max(CARRIED * above.sum(), 2.0 * GAIN * squares.sum())
+    return carried_by_first_samples(left) or bool(above[:count].sum() >= least > 0.0)
 
 
 def _left(fit: Identification, data: Dataset) -> NDArray[np.float64]:

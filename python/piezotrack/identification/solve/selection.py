@@ -50,9 +50,9 @@ LEAST_SQUARES = (
     "duhem",
 )
 SEARCHED = ("first-order-dahl", "parallel-dahl", "bouc-wen")
-# Of these, the one that predicts other motions where plays describe only the record: tried unless
-# those leave nothing but noise.
-OTHERWISE = "bouc-wen"
+# Of these, one of few values predicts other motions where plays describe only the record: tried
+# unless those leave nothing but noise.
+FEW_VALUES = "bouc-wen"
 # Models that contain another one, whose search costs less: tried where it is near the best.
 CONTAINED = {"parallel-dahl": "first-order-dahl"}
 NEAR_BEST = 1.5
@@ -134,9 +134,9 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     with shares.begin(len(infos)):
         fit = whole(best, best.start)
         noise = max(noise_of(record.data) for record in problem.records)
-        one = trials.otherwise(best)
+        one = trials.of_few_values(best)
         if one is not None and fit.cost > HARDLY_MORE * min(fit.noises):
-            # Few parameters that describe the whole record as well as many weights predict more.
+            # Few values that describe the whole record as well as many weights do predict more.
             with suppress(DataError, NumericalError):
                 of_model = _as_shown(problem, Structure.of(fit)).of_model(one.info)
                 other = identify_model(of_model, methods.method(one.info), run)
@@ -213,7 +213,7 @@ class _Trials:
     def worth_searching(self, name: str) -> bool:
         """Return whether a model that is searched may be better than what was found so far."""
         near = self.least < NEAR_NOISE or self.fitted < NOTHING_BUT_NOISE
-        return self.least > NOTHING_BUT_NOISE and (name == OTHERWISE or not near)
+        return self.least > NOTHING_BUT_NOISE and (name == FEW_VALUES or not near)
 
     def whole(self, problem: Problem, info: ModelInfo) -> Problem:
         """Return the problem of a model on the whole records, with the delays that were shown."""
@@ -224,11 +224,11 @@ class _Trials:
         """Return the problem of a model; what least squares have shown is in searched ones too."""
         return (_as_shown(problem, self.start) if info.searched else problem).of_model(info)
 
-    def otherwise(self, best: Tried) -> Tried | None:
-        """Return the trial of the model that is searched beside plays where it comes near them."""
-        if best.info.searched or self.least <= NOTHING_BUT_NOISE or not self.near_best(OTHERWISE):
+    def of_few_values(self, best: Tried) -> Tried | None:
+        """Return the trial of the model of few values, where it comes near a best one of many."""
+        if best.info.searched or self.least <= NOTHING_BUT_NOISE or not self.near_best(FEW_VALUES):
             return None
-        return next((one for one in self.found if one.info.name == OTHERWISE), None)
+        return next((one for one in self.found if one.info.name == FEW_VALUES), None)
 
     def others(self, best: Tried) -> list[Tried]:
         """Return the models that are fitted to the whole records beside the best one."""
