@@ -14,6 +14,9 @@ from scipy.integrate import solve_ivp
 
 import piezotrack as pt
 from piezotrack.cli.commands import app
+from piezotrack.identification.problem.problem import Problem
+from piezotrack.identification.problem.records import Record
+from piezotrack.identification.solve.variants.exponent import _Profile
 from reference import multisine, sine, triangle
 
 if TYPE_CHECKING:
@@ -320,6 +323,19 @@ def test_an_exponent_is_fitted(tmp_path: Path, exponent: float) -> None:
     y = pt.BoucWenStage(**scaled, exponent=exponent).simulate(u, 2e-3).x
     assert fit.score(pt.Dataset(u=u, y=y, dt=2e-3)).rms < 0.3 * noise
     assert pt.load(fit.save(tmp_path / "exponent.json")).model == fit.model
+
+
+def test_a_descent_begins_with_branches_that_decay_as_those_of_another_exponent() -> None:
+    """The hysteresis decays per volt by beta |h|^(n - 1), with h in metres."""
+    data = log()
+    fit = pt.identify(data, "bouc-wen", history="virgin", method=pt.Descents(seed=1))
+    problem = Problem(model="bouc-wen", records=(Record(data, history="virgin"),))
+    values = _Profile(problem, fit, threads=1).alike(1.0, 1.5)
+    scaled = {name: values[name] for name in ("beta", "gamma", "exponent")}
+    stage = replace(fit.model, **scaled)
+    hysteresis = fit.simulate(data).hysteresis
+    other = stage.simulate(data.u, data.dt).hysteresis
+    assert np.std(other - hysteresis) < 0.2 * np.std(hysteresis)
 
 
 def test_an_exponent_is_held_at_what_is_given() -> None:

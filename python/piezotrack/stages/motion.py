@@ -84,7 +84,7 @@ class Response:
     v : ndarray, shape (n,)
         Velocity [m/s]; 0 where the model has no mechanics.
     hysteresis : ndarray, shape (n,)
-        Hysteresis force [N]; where the hysteresis is at the input its output, before creep and
+        Hysteresis force [N]; of plays and relays at the input their output, before creep and
         dynamics [m].
     final : StageState
         State of the model at the last sample; ``initial=final`` continues from there.

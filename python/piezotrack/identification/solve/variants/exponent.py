@@ -30,7 +30,7 @@ __all__ = ["with_exponent_tried"]
 
 MODEL, NAME = "bouc-wen", "exponent"
 # Largest exponent, and the factor from one to the next.
-MOST, STEP = 4.5, 1.15
+MOST, STEP = 4.5, 1.2
 # Factor beside the best one of a thinned record with which it is found in the whole record, and how
 # often it is applied at most.
 BESIDE, MOST_BESIDE = 1.03, 8
@@ -142,8 +142,8 @@ class _Profile:
         self.problem, self.threads = problem, threads
         values = {name: one.value for name, one in fit.parameters.items()}
         run = fit.simulate(problem.records[0].data)
-        # At this size the branches of two exponents decay alike.
-        self.size = float(np.abs(run.hysteresis).max())
+        # At this size [m] the branches of two exponents decay alike; what is simulated is a force.
+        self.size = float(np.abs(run.hysteresis).max()) / values["stiffness"]
         self.values: dict[float, dict[str, float]] = {1.0: values}
         self.costs: dict[float, float] = {}
         self.n = 1.0
@@ -151,16 +151,12 @@ class _Profile:
 
     def best(self) -> float:
         """Find the best exponent; return its cost."""
-        n, before, step = 1.0, self.costs[1.0], STEP
-        while n * step <= MOST:
-            cost = self.descend(n, n * step)
-            if cost < before:
-                n, before = n * step, cost
-            elif step < STEP:
+        n, before = 1.0, self.costs[1.0]
+        while n * STEP <= MOST:
+            cost = self.descend(n, n * STEP)
+            if not cost < before:
                 break
-            else:
-                # A descent from too far may end in another minimum.
-                step = math.sqrt(STEP)
+            n, before = n * STEP, cost
         self.n = self.vertex(n)
         return self.costs[self.n]
 
@@ -192,14 +188,19 @@ class _Profile:
             return n
         return at
 
-    def descend(self, start: float, n: float) -> float:
-        """Descend with the exponent `n` from where that with another one ended; return the cost."""
-        objective = Objective._of(held(self.problem, n), self.threads)
+    def alike(self, start: float, n: float) -> dict[str, float]:
+        """Return the parameters found with one exponent, as they decay alike with another."""
         scale = self.size ** (start - n)
-        known = {
+        values = {
             name: value * (scale if name in DECAYS else 1.0)
             for name, value in self.values[start].items()
         }
+        return {**values, NAME: n}
+
+    def descend(self, start: float, n: float) -> float:
+        """Descend with the exponent `n` from where that with another one ended; return the cost."""
+        objective = Objective._of(held(self.problem, n), self.threads)
+        known = self.alike(start, n)
         place = [
             coordinate(known[name], low, high, kind)
             for name, low, high, kind in objective.coordinates
