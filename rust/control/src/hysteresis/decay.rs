@@ -1,6 +1,6 @@
 //! The exponential decay along a path, of any length, in lanes.
 
-use super::bouc_wen::{RECIPROCAL_FACTORIAL, TERMS, growth};
+use super::series::{RECIPROCAL_FACTORIAL, TERMS, growth};
 use crate::Number;
 
 /// Longest path for which the series is summed as it is.

@@ -19,8 +19,8 @@
 //! both ends and in the middle, for which the equation has a closed form: exact for a constant g,
 //! where the operator is [`super::FirstOrderDahl`] with exponent 1.
 
-use super::bouc_wen::RECIPROCAL_FACTORIAL;
 use super::decay::decay;
+use super::series::RECIPROCAL_FACTORIAL;
 use crate::Number;
 use crate::cubic_motion::{CubicVelocity, between, turning_time};
 
