@@ -86,12 +86,29 @@ pub trait Real: Number<Lane = Self> + PartialOrd + Default + Debug + Into<f64> +
     const MIN_POSITIVE: Self;
     /// Numbers this far from 0 soon overflow, and enter no state: 1e100, 1e30 in single precision.
     const HUGE: Self;
+    /// The least exponent of 2 of a number with all its digits; the most is 1 less this one.
+    const LEAST_EXPONENT: Self;
+    /// Added to a number of a smaller size and subtracted again, it rounds that to the nearest whole
+    /// number.
+    const WHOLE: Self;
 
     /// The number nearest to `value`.
     fn of(value: f64) -> Self;
 
     /// A count, rounded where it has more digits than the type.
     fn count(count: u32) -> Self;
+
+    /// The mantissa of a number from [`Self::MIN_POSITIVE`] up, from the root of 1/2 to that of 2.
+    #[must_use]
+    fn mantissa(self) -> Self;
+
+    /// The exponent of 2 that goes with [`Self::mantissa`].
+    #[must_use]
+    fn exponent(self) -> Self;
+
+    /// 2 to a whole power, from [`Self::LEAST_EXPONENT`] to 1 less it.
+    #[must_use]
+    fn two_to(self) -> Self;
 
     /// The magnitude.
     #[must_use]
@@ -145,6 +162,14 @@ pub trait Real: Number<Lane = Self> + PartialOrd + Default + Debug + Into<f64> +
     fn is_usable(self) -> bool {
         self.abs() < Self::HUGE
     }
+}
+
+/// The exponent in the bits of a number whose mantissa is from the root of 1/2 to that of 2.
+macro_rules! biased_exponent {
+    ($real:ident, $bits:expr) => {{
+        let more = (1.0 as $real).to_bits() - core::$real::consts::FRAC_1_SQRT_2.to_bits();
+        $bits.wrapping_add(more) >> ($real::MANTISSA_DIGITS - 1)
+    }};
 }
 
 /// Implements both traits for a real type, with functions of libm by their names, and items that only
@@ -231,8 +256,31 @@ macro_rules! real {
             const EPSILON: Self = Self::EPSILON;
             const MIN_POSITIVE: Self = Self::MIN_POSITIVE;
             const HUGE: Self = $huge;
+            const WHOLE: Self = 1.5 / Self::EPSILON;
 
             $($own)*
+
+            #[inline(always)]
+            fn mantissa(self) -> Self {
+                let bits = self.to_bits();
+                let whole = biased_exponent!($real, bits) << ($real::MANTISSA_DIGITS - 1);
+                $real::from_bits(bits.wrapping_sub(whole).wrapping_add((1.0 as $real).to_bits()))
+            }
+
+            #[inline(always)]
+            fn exponent(self) -> Self {
+                // In the last digits of 1/EPSILON a whole number is its bits.
+                let zero = 1.0 / Self::EPSILON;
+                let biased = biased_exponent!($real, self.to_bits());
+                let bias = 1.0 - Self::LEAST_EXPONENT;
+                $real::from_bits(zero.to_bits() | biased) - zero - bias
+            }
+
+            #[inline(always)]
+            fn two_to(self) -> Self {
+                let last = (self + Self::WHOLE).to_bits() << ($real::MANTISSA_DIGITS - 1);
+                $real::from_bits(last.wrapping_add((1.0 as $real).to_bits()))
+            }
 
             #[inline(always)]
             fn abs(self) -> Self {
@@ -283,6 +331,8 @@ macro_rules! real {
 }
 
 real!(f64, 1e100, fma, sqrt, log, log1p, exp, expm1, pow, tanh, copysign, {
+    const LEAST_EXPONENT: Self = -1022.0;
+
     #[inline(always)]
     fn of(value: f64) -> Self {
         value
@@ -295,6 +345,8 @@ real!(f64, 1e100, fma, sqrt, log, log1p, exp, expm1, pow, tanh, copysign, {
 });
 
 real!(f32, 1e30, fmaf, sqrtf, logf, log1pf, expf, expm1f, powf, tanhf, copysignf, {
+    const LEAST_EXPONENT: Self = -126.0;
+
     #[expect(clippy::cast_possible_truncation, reason = "rounded to the nearest")]
     #[inline(always)]
     fn of(value: f64) -> Self {

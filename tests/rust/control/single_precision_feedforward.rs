@@ -193,9 +193,9 @@ fn the_inverse_of_an_oscillator_differs_by_the_roundings_of_its_samples() {
         let hysteresis = (alpha, 0.6 * rate, 0.4 * rate, exponent);
         let inverse = OscillatorInverse::new(0.18, 50.0, 2.6e4, hysteresis, DT).unwrap();
         let [found, _] = apart(inverse, true);
-        // Of a power in each of four slopes, in pieces of a fiftieth of the path that decays.
-        let pieces = if exponent > 1.0 { 50.0 * 4.0 * 20.0 } else { 60.0 };
-        let sample = alpha * 3.0 * U * LARGEST[0] + pieces * U * limit;
+        // Of a power and a series, in seven pieces of the path that decays.
+        let operations = if exponent > 1.0 { 7.0 * 60.0 } else { 60.0 };
+        let sample = alpha * 3.0 * U * LARGEST[0] + operations * U * limit;
         let bound = linear([2.6e4, 50.0, 0.18]) + REMEMBERED * sample;
         assert!(found > 0.0 && found < bound, "{found} N of {bound} N");
     }

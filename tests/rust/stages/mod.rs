@@ -2,6 +2,7 @@
 
 mod asymmetric_bouc_wen;
 mod asymmetric_prandtl_ishlinskii;
+mod bouc_wen;
 mod duhem;
 mod generalised_prandtl_ishlinskii;
 mod inverse;

@@ -13,12 +13,11 @@
 //! ```
 //!
 //! For n = 1 the solution is an exponential in p up to the point where z changes sign, which has
-//! a closed form too, and another exponential beyond it. For any other exponent the equation is
-//! integrated in short Runge-Kutta steps of fourth order.
+//! a closed form too, and another exponential beyond it. For any other exponent power series of the
+//! solution are summed.
 
-use core::cmp::Ordering;
-
-use super::series::{TERMS, growth, logarithm};
+use super::power_series::{PowerSeries, RECIPROCAL, TERMS};
+use super::series::{self, growth, logarithm, power};
 use super::{NonsmoothOperator, Operator};
 use crate::cast::{Cast, rounded};
 use crate::error::Result;
@@ -78,12 +77,16 @@ pub struct BoucWenBranch<N> {
 
 /// Longest piece with n = 1, times the rate: the series below are summed for it.
 const PIECE: f64 = 0.5;
-/// Longest piece with another exponent, times the rate: an error of 1e-8 of the change.
-const SHORT_PIECE: f64 = 0.02;
+/// Longest piece with another exponent, times the rate: the error is below 1e-9 of the change.
+const SHORT_PIECE: f64 = 0.15;
+/// Share of the slope A that the decay takes from it where z counts as near 0.
+const NEAR: f64 = 0.1;
+/// Terms of the series of the path near 0: the next is below `NEAR`^16 / 17 = 6e-18.
+const PATH_TERMS: usize = 16;
 /// Most pieces with n = 1: e^-40 of the distance to the limit is left after them.
 const MOST_PIECES: usize = 80;
 /// Most pieces with another exponent.
-const MOST_SHORT_PIECES: usize = 2000;
+const MOST_SHORT_PIECES: usize = 250;
 
 impl Cast for BoucWen<Unfused> {
     type In<T: Real> = BoucWen<Unfused<T>>;
@@ -102,14 +105,7 @@ impl<N: Number> BoucWen<N> {
     /// The output, counted along the direction of motion, after a path of length `length`.
     #[inline(always)]
     fn advance(&self, z: N, length: N) -> N {
-        if self.is_exact() {
-            return self.lead_exact(z, length);
-        }
-        let n = self.exponent;
-        let arguments = [z, length, self.rise, self.beta, self.gamma];
-        N::lanewise(arguments, move |[z, length, rise, beta, gamma]| {
-            Bend { rise, beta, gamma, n }.advance(z, length)
-        })
+        if self.is_exact() { self.lead_exact(z, length) } else { self.lead_bent(z, length) }
     }
 
     #[inline(always)]
@@ -150,7 +146,7 @@ impl<N: Number> BoucWen<N> {
         let side = self.side(z, length);
         let kappa = side.mul_add(self.gamma, self.beta);
         let slope = kappa.mul_add(-z, self.rise);
-        let end = (slope * length).mul_add(growth::<_, TERMS>(-(kappa * length)), z);
+        let end = (slope * length).mul_add(growth::<_, { series::TERMS }>(-(kappa * length)), z);
         let crossed = side * end;
         if !crossed.any_negative() {
             return end;
@@ -160,8 +156,113 @@ impl<N: Number> BoucWen<N> {
         let zero_at = reach * logarithm(-(kappa * reach));
         let rest = length - zero_at;
         let kappa = self.beta - side * self.gamma;
-        let beyond = (self.rise * rest) * growth::<_, TERMS>(-(kappa * rest));
+        let beyond = (self.rise * rest) * growth::<_, { series::TERMS }>(-(kappa * rest));
         crossed.where_negative(beyond, end)
+    }
+
+    /// Another n: power series in the path, through z = 0 those of [`Self::through_zero`].
+    #[inline(always)]
+    fn lead_bent(&self, mut z: N, length: N) -> N {
+        let (zero, one) = (z.like(0.0), z.like(1.0));
+        let mut left = length;
+        for _ in 0..MOST_SHORT_PIECES {
+            let bent = z * self.bent(z);
+            let kappa = self.side(z, left).mul_add(self.gamma, self.beta);
+            let far = magnitude(kappa * bent) - z.like(NEAR) * magnitude(self.rise);
+            // NaN is far.
+            let far = far.where_negative(-one, one);
+            let [mut end, mut more] = [z, left];
+            if (-far).any_negative() {
+                [end, more] = self.away_from_zero([z, bent], kappa, left);
+            }
+            if far.any_negative() {
+                let near = self.through_zero(z, kappa * bent, left);
+                end = far.where_negative(near[0], end);
+                more = far.where_negative(near[1], more);
+            }
+            // Other lanes may be at their ends.
+            z = (-left).where_negative(end, z);
+            left = left - more;
+            if !(-left).any_negative() {
+                return z;
+            }
+        }
+        // A bounded output has reached its limit by now; any other grows without bound.
+        let moving = magnitude(self.slope(z, zero) * left);
+        let still = magnitude(z).mul_add(z.like(1e-4), -moving);
+        let end = still.where_negative(z.each(N::Lane::INFINITY), z);
+        (-left).where_negative(end, z)
+    }
+
+    /// |z|^(n-1)
+    #[inline(always)]
+    fn bent(&self, z: N) -> N {
+        power(magnitude(z), self.exponent - N::Lane::of(1.0))
+    }
+
+    /// Output and length of one piece, from z that is not 0 and from z |z|^(n-1): the power series of
+    /// z in the path.
+    ///
+    /// That of the power follows from z v' = n v z'.
+    #[inline(always)]
+    fn away_from_zero(&self, [z, bent]: [N; 2], kappa: N, left: N) -> [N; 2] {
+        let n = self.exponent;
+        let least = z.each(N::Lane::MIN_POSITIVE);
+        let inverse = z.like(1.0) / (magnitude(z) - least).where_negative(least, z);
+        let slope = kappa.mul_add(-bent, self.rise);
+        // Of the decay, and of z itself, which must not come near 0 or change its power much.
+        let decay = z.each(n) * magnitude(kappa * bent * inverse);
+        let change = z.each((n * N::Lane::of(0.5)).larger(N::Lane::of(1.0)));
+        let longest = z.like(SHORT_PIECE) / decay.larger(change * magnitude(slope * inverse));
+        let more = (left - longest).where_negative(left, longest);
+        let mut series = PowerSeries::new(z, bent);
+        series.push(slope * more);
+        for k in 1..TERMS - 1 {
+            let rate = kappa * series.raise(n, inverse);
+            series.push(-rate * more * z.like(RECIPROCAL[k + 1]));
+        }
+        [series.sum(), more]
+    }
+
+    /// Output and length of one piece from near z = 0, given the decrease kappa z |z|^(n-1) of the
+    /// slope.
+    ///
+    /// With p counted from where z = 0, z is A p times a power series in s = kappa p |A p|^(n-1), and
+    /// p is z/A times one in r = kappa z |z|^(n-1)/A.
+    #[inline(always)]
+    fn through_zero(&self, z: N, decrease: N, left: N) -> [N; 2] {
+        let (one, n) = (N::Lane::of(1.0), self.exponent);
+        let mut parts = [one; PATH_TERMS];
+        let mut multiple = one;
+        for part in &mut parts {
+            *part = one / multiple;
+            multiple = multiple + n;
+        }
+        let r = decrease / self.rise;
+        let mut sum = z.each(parts[PATH_TERMS - 1]);
+        for part in parts[..PATH_TERMS - 1].iter().rev() {
+            sum = sum.mul_add(r, z.each(*part));
+        }
+        let from = z / self.rise * sum;
+        let mut to = from + left;
+        let mut more = left;
+        let kappa = (self.rise * to).where_negative(self.beta - self.gamma, self.beta + self.gamma);
+        let mut s = kappa * to * self.bent(self.rise * to);
+        let widest = z.like(2.0 * NEAR);
+        let room = widest - magnitude(s);
+        if room.any_negative() {
+            let share = widest / magnitude(s);
+            to = room.where_negative(to * power(share, one / n), to);
+            s = room.where_negative(s * share, s);
+            more = room.where_negative(to - from, more);
+        }
+        let mut series = PowerSeries::new(z.like(1.0), z.like(1.0));
+        series.push(-s * z.each(parts[1]));
+        for k in 1..TERMS - 1 {
+            let power = series.raise(n, z.like(1.0));
+            series.push(-s * power * z.each(parts[k + 1]));
+        }
+        [self.rise * to * series.sum(), more]
     }
 
     /// dz/dp at the beginning of a path of length `length`.
@@ -171,10 +272,7 @@ impl<N: Number> BoucWen<N> {
         if self.is_exact() {
             return kappa.mul_add(-z, self.rise);
         }
-        let n = self.exponent;
-        N::lanewise([z, kappa, self.rise], move |[z, kappa, rise]| {
-            Bend { rise, beta: kappa, gamma: N::Lane::ZERO, n }.slope(z, kappa)
-        })
+        (kappa * z).mul_add(-self.bent(z), self.rise)
     }
 
     /// Sign of z at the beginning of a move; where z = 0, its sign right after the beginning.
@@ -217,82 +315,6 @@ impl<N: Number> NonsmoothOperator<N> for BoucWen<N> {
     #[inline(always)]
     fn leaving(&self, state: &BoucWenState<N>, distance: N, direction: N) -> BoucWenState<N> {
         BoucWenState { slope: self.slope(direction * state.value, direction * distance), ..*state }
-    }
-}
-
-/// The operator with an exponent other than 1, for scalars.
-#[derive(Clone, Copy)]
-struct Bend<T> {
-    rise: T,
-    beta: T,
-    gamma: T,
-    n: T,
-}
-
-impl<T: Real> Bend<T> {
-    /// Runge-Kutta steps of fourth order along the path, their length limited by the decay rate.
-    /// The distance to a sign change of z is found by quadrature over z.
-    #[inline(never)]
-    fn advance(self, mut z: T, length: T) -> T {
-        let (zero, one) = (T::ZERO, T::of(1.0));
-        let mut left = length;
-        // The rate at the limit that z tends to, on one side of 0.
-        let mut limit = (zero, zero);
-        for _ in 0..MOST_SHORT_PIECES {
-            let side = if z + T::of(1e-12) * self.rise * left < zero { -one } else { one };
-            let kappa = self.beta + side * self.gamma;
-            let power = z.abs().pow(self.n - one);
-            // The rate where |z| is largest: here, or at the limit.
-            let here = kappa.abs() * power;
-            if limit.0 * side <= zero {
-                let share = one / self.n;
-                let rate = self.rise.abs().pow(one - share);
-                limit = (side, rate * kappa.abs().pow(share));
-            }
-            let fastest = if here.is_nan() { limit.1 } else { here.larger(limit.1) };
-            let longest = T::of(SHORT_PIECE) / (self.n * fastest);
-            let more = if left < longest { left } else { longest };
-            z = self.piece((z, power), more, side, kappa);
-            left = left - more;
-            // Written so that NaN ends the loop too.
-            if left.partial_cmp(&zero) != Some(Ordering::Greater) {
-                return z;
-            }
-        }
-        // A bounded output has reached its limit by now; any other grows without bound.
-        let kappa = self.beta + if z < zero { -self.gamma } else { self.gamma };
-        let still = (self.slope(z, kappa) * left).abs() <= T::of(1e-4) * z.abs();
-        if still { z } else { T::INFINITY }
-    }
-
-    /// One step from `z`, whose power of n - 1 is known.
-    fn piece(self, (z, power): (T, T), length: T, side: T, kappa: T) -> T {
-        let end = self.runge_kutta((z, power), length, kappa);
-        if side * end >= T::ZERO {
-            return end;
-        }
-        // dp/dz is smooth between z and 0: Boole's rule.
-        let slowness = |part: f64| T::of(1.0) / self.slope(z * T::of(part), kappa);
-        let sum = T::of(7.0) * (slowness(1.0) + slowness(0.0))
-            + T::of(32.0) * (slowness(0.75) + slowness(0.25))
-            + T::of(12.0) * slowness(0.5);
-        let rest = length + z * sum / T::of(90.0);
-        // n is above 1: the power of 0 is 0.
-        self.runge_kutta((T::ZERO, T::ZERO), rest, self.beta - side * self.gamma)
-    }
-
-    fn runge_kutta(self, (z, power): (T, T), length: T, kappa: T) -> T {
-        let (half, two) = (T::of(0.5), T::of(2.0));
-        let k1 = self.rise - kappa * z * power;
-        let k2 = self.slope(z + half * length * k1, kappa);
-        let k3 = self.slope(z + half * length * k2, kappa);
-        let k4 = self.slope(z + length * k3, kappa);
-        z + length / T::of(6.0) * (k1 + two * (k2 + k3) + k4)
-    }
-
-    /// dz/dp.
-    fn slope(self, z: T, kappa: T) -> T {
-        self.rise - kappa * z * z.abs().pow(self.n - T::of(1.0))
     }
 }
 

@@ -14,6 +14,7 @@ mod first_order_dahl;
 mod lugre;
 mod parallel_dahl;
 mod play;
+mod power_series;
 mod series;
 
 pub use asymmetric_bouc_wen::AsymmetricBoucWen;
