@@ -62,12 +62,16 @@ impl<N: Number, O: NonsmoothOperator<N>> Coupling<N> for InputCoupling<N, O> {
             operator = self.operator.along(&branch, gap);
             onward = gap.like(0.0);
         }
+        // Under a drive that is held nothing below depends on slopes.
+        let moves = (-(rise * rise)).any_negative();
         let branch = self.operator.branch(&operator, direction);
-        if !onward.any_negative() {
+        if moves && !onward.any_negative() {
             operator = self.operator.leaving(&operator, rise, direction);
         }
         let (h0, slope0) = self.operator.output(&operator);
-        let operator = self.operator.along(&branch, rise);
+        if moves {
+            operator = self.operator.along(&branch, rise);
+        }
         let (h1, slope1) = self.operator.output(&operator);
 
         let (k, p) = (self.stiffness, &self.linear);
