@@ -260,15 +260,20 @@ TRUE = {
 }
 
 
+def with_exponent(exponent: float) -> pt.BoucWenStage:
+    """The stage whose branches decay as those of `TRUE` at a hysteresis of 10 um."""
+    size = 1e-5 ** (1 - exponent)
+    scaled = TRUE | {"beta": TRUE["beta"] * size, "gamma": TRUE["gamma"] * size}
+    return pt.BoucWenStage(**scaled, exponent=exponent)
+
+
 def log(noise: float = 0.0, exponent: float = 1.0) -> pt.Dataset:
     """A made-up record with loops of several sizes, 8 s at 500 Hz."""
     dt = 2e-3
     t = np.arange(4001) * dt
     swing = 37.5 * (1 - np.cos(0.5 * np.pi * t)) * (0.4 + 0.6 * t / 8.0)
     u = swing + 10.0 * np.sin(2 * np.pi * 1.3 * t) ** 2
-    size = 1e-5 ** (1 - exponent)
-    scaled = TRUE | {"beta": TRUE["beta"] * size, "gamma": TRUE["gamma"] * size}
-    y = pt.BoucWenStage(**scaled, exponent=exponent).simulate(u, dt).x
+    y = with_exponent(exponent).simulate(u, dt).x
     y += np.random.default_rng(5).normal(0.0, noise, y.size)
     return pt.Dataset(u=u, y=y, dt=dt, source="made-up")
 
@@ -317,12 +322,28 @@ def test_an_exponent_is_fitted(tmp_path: Path, exponent: float) -> None:
     assert fit.parameters["exponent"].free
     assert fit.cost < 1.05 * noise
     t = np.arange(2000) * 2e-3
-    size = 1e-5 ** (1 - exponent)
-    scaled = TRUE | {"beta": TRUE["beta"] * size, "gamma": TRUE["gamma"] * size}
     u = 30.0 * (1.0 - np.cos(5.0 * t)) * np.exp(-0.3 * t)
-    y = pt.BoucWenStage(**scaled, exponent=exponent).simulate(u, 2e-3).x
+    y = with_exponent(exponent).simulate(u, 2e-3).x
     assert fit.score(pt.Dataset(u=u, y=y, dt=2e-3)).rms < 0.3 * noise
     assert pt.load(fit.save(tmp_path / "exponent.json")).model == fit.model
+
+
+@pytest.mark.parametrize("jumps", ["within", "before"])
+def test_an_exponent_is_fitted_where_the_drive_jumps(jumps: str) -> None:
+    """Under steps, and where the drive jumped from rest to the first sample."""
+    dt, noise = 2e-3, 0.05e-6
+    t = np.arange(3000) * dt
+    if jumps == "within":
+        u = np.repeat(np.random.default_rng(3).uniform(0.0, 75.0, 30), 100)
+    else:
+        u = 37.5 + 30.0 * np.sin(5.0 * t) * np.exp(-0.2 * t)
+    before = np.concatenate([np.zeros(2), u])
+    x = with_exponent(1.7).simulate(before, dt, hold="zoh").x[2:]
+    y = x + np.random.default_rng(5).normal(0.0, noise, x.size)
+    data = pt.Dataset(u=u, y=y, dt=dt, hold="zoh")
+    fit = pt.identify(data, "bouc-wen", method=pt.Descents(seed=1))
+    assert fit.model.exponent == pytest.approx(1.7, rel=0.03)
+    assert fit.cost < 1.05 * noise
 
 
 def test_a_descent_begins_with_branches_that_decay_as_those_of_another_exponent() -> None:

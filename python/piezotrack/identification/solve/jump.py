@@ -41,7 +41,9 @@ ROUNDS = 3
 VERY_FIRST, CARRIED = 0.01, 0.5
 
 
-def with_rest_tried(problem: Problem, fit: Identification, identify: Identify) -> Identification:
+def with_rest_tried(
+    problem: Problem, fit: Identification, at_rest: Callable[[], Identification]
+) -> Identification:
     """Try that the stage was at rest before where the first samples carry the residual.
 
     Parameters
@@ -50,8 +52,8 @@ def with_rest_tried(problem: Problem, fit: Identification, identify: Identify) -
         The problem, of one record.
     fit : Identification
         Its result without a jump.
-    identify : callable
-        What solves a problem, from a structure if one is given.
+    at_rest : callable
+        What solves it with a jump, as `with_rest`.
 
     Returns
     -------
@@ -65,7 +67,7 @@ def with_rest_tried(problem: Problem, fit: Identification, identify: Identify) -
         return fit
     if not _begins_apart(fit, data):
         return fit
-    jumped = with_rest(problem, identify)
+    jumped = at_rest()
     later = float(np.sqrt(np.mean(_left(fit, jumped.data) ** 2)))
     # The first sample, where the jump lies, may be all that it explains.
     explains = jumped.cost < min(later, (1.0 - GAIN) * fit.cost)

@@ -13,11 +13,11 @@ from ..fitted.start import GAIN
 from ..methods.least_squares import LeastSquares
 from ..methods.particle_swarm import ParticleSwarm
 from .earlier_motion import earlier_motion, refined_cost
-from .jump import with_rest, with_rest_tried
+from .jump import voltage_of_rest, with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
 from .variants.delay import with_delay_tried
-from .variants.exponent import with_exponent_tried
+from .variants.exponent import may_bend, with_exponent_tried
 from .weights import solve_least_squares
 
 if TYPE_CHECKING:
@@ -75,12 +75,22 @@ def identify_model(
         def plain(one: Problem, begun: Structure | None = None) -> Identification:
             return _identify(one, method, run, begun or start)
 
+        def bent(one: Problem, begun: Structure | None = None) -> Identification:
+            return _with_exponent(one, plain(one, begun), method, run)
+
+        def at_rest() -> Identification:
+            fit = with_rest(other, plain, rest)
+            if not may_bend(other, fit):
+                return fit
+            fit_bent = with_rest(other, bent, voltage_of_rest(fit))
+            return fit_bent if fit_bent.cost < (1.0 - GAIN) * fit.cost else fit
+
         if rest is not None or any(record.history == "rest" for record in other.records):
-            return with_rest(other, plain, rest)
-        fit = plain(other)
+            return at_rest()
+        fit = bent(other)
         # What is worse than another model without a jump lacks more than that.
         worse = start is not None and fit.cost > start.cost
-        return fit if worse or len(other.records) > 1 else with_rest_tried(other, fit, plain)
+        return fit if worse or len(other.records) > 1 else with_rest_tried(other, fit, at_rest)
 
     return with_delay_tried(problem, method, start, rest, identify)
 
@@ -93,13 +103,21 @@ def _identify(
     if len(problem.records) > 1:
         return search_several_records(problem, method, run)
 
+    if problem.records[0].history is not None:
+        return search_parameters(problem, method, run)
+    return _with_history_shown(problem, method, run)
+
+
+def _with_exponent(
+    problem: Problem, fit: Identification, method: Method, run: Run
+) -> Identification:
+    """Try exponents other than 1."""
+    if isinstance(method, LeastSquares):
+        return fit
+
     def search(other: Problem, by: Search | None) -> Identification:
         return search_parameters(other, by or method, run)
 
-    if problem.records[0].history is not None:
-        fit = search(problem, None)
-    else:
-        fit = _with_history_shown(problem, method, run)
     return with_exponent_tried(problem, fit, search, run.threads)
 
 

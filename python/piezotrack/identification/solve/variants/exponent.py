@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ....data.checks.diagnostics import jumps
 from ....data.dataset import Dataset
 from ...fitted.start import GAIN
 from ...methods.descents import Descents
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["with_exponent_tried"]
+__all__ = ["may_bend", "with_exponent_tried"]
 
 MODEL, NAME = "bouc-wen", "exponent"
 # Largest exponent, and the factor from one to the next.
@@ -34,14 +33,12 @@ MOST, STEP = 4.5, 1.2
 # Factor beside the best one of a thinned record with which it is found in the whole record, and how
 # often it is applied at most.
 BESIDE, MOST_BESIDE = 1.03, 8
-# A residual of so many times the noise has nothing but noise in it.
-NOISY = 1.05
 # Parameters whose unit the exponent decides.
 DECAYS = ("beta", "gamma")
-# Most samples of a record, of one that cannot be thinned, and of one that is, and fewest; and the
-# distance of the drive from straight lines between those that are kept, as a share of its range,
-# and where they are too many.
-MOST_SAMPLES, MOST_WHOLE, MOST_THINNED, FEWEST = 20_000, 6000, 2000, 500
+# Most samples of a record, and of one that is thinned, and fewest; and the distance of the drive
+# from straight lines between those that are kept, as a share of its range, and where they are too
+# many.
+MOST_SAMPLES, MOST_THINNED, FEWEST = 20_000, 2000, 500
 OFF, MOST_OFF = 1e-4, 1e-2
 # Share of a parameter within which the last search stays, and by how much its cost may be above
 # that of the profile.
@@ -72,17 +69,10 @@ def with_exponent_tried(
     Identification
         The one with the best exponent where that lowers the cost by 2 %.
     """
-    if not _is_free(problem) or fit.start is None or fit.start.history == "rest":
-        return fit
-    if len(problem.records) > 1 or jumps(problem.records[0].data.full.u):
-        return fit
-    if fit.cost <= max(NOISY * fit.noises[0], 1e-9 * fit.stroke):
+    if fit.start is None or not may_bend(problem, fit):
         return fit
     (record,) = problem.records
-    thin = _thinned(record.data)
-    if thin is None:
-        return fit
-    history = fit.start.history
+    thin, history = _thinned(record.data), fit.start.history
     few = replace(problem, records=(replace(record, data=thin, history=history),))
     profile = _Profile(few, fit, threads)
     cost = profile.best()
@@ -98,6 +88,28 @@ def with_exponent_tried(
     return replace(found, method=fit.method, nfev=fit.nfev + found.nfev, details=details)
 
 
+def may_bend(problem: Problem, fit: Identification) -> bool:
+    """Return whether another exponent may lower the cost of a fit with 1.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    fit : Identification
+        Its result with the exponent 1.
+
+    Returns
+    -------
+    bool
+        False also of several records, and of long ones.
+    """
+    if not _is_free(problem) or len(problem.records) > 1:
+        return False
+    if len(problem.records[0].data.full) > MOST_SAMPLES:
+        return False
+    return (1.0 - GAIN) * fit.cost > max(fit.noises[0], 1e-9 * fit.stroke)
+
+
 def _is_free(problem: Problem) -> bool:
     """Whether nothing is said that goes with an exponent of 1."""
     given = problem.parameters
@@ -109,11 +121,11 @@ def _is_free(problem: Problem) -> bool:
     )
 
 
-def _thinned(data: Dataset) -> Dataset | None:
-    """Keep every so many of the samples, as straight lines between them allow; None of too many."""
+def _thinned(data: Dataset) -> Dataset:
+    """Keep every so many of the samples, as straight lines between them allow."""
     u = data.full.u
-    if len(u) > MOST_SAMPLES or data.left_out is not None or data.hold != "foh":
-        return data if len(u) <= MOST_WHOLE else None
+    if data.hold != "foh":
+        return data
     every = len(u) // FEWEST
     while every > 1 and _off(u, every) > OFF:
         every -= 1
@@ -122,17 +134,23 @@ def _thinned(data: Dataset) -> Dataset | None:
     if fewer > every and _off(u, fewer) <= MOST_OFF:
         every = fewer
     if every <= 1:
-        return data if len(u) <= MOST_WHOLE else None
-    full = data.full
-    thin = Dataset(u=u[::every], y=full.y[::every], t=full.t[::every], drive_unit=data.drive_unit)
+        return data
+    full, kept = data.full, slice(None, None, every)
+    y = full.y if full.left_out is None else np.where(full.left_out, math.nan, full.y)
+    thin = Dataset(
+        u=u[kept], y=y[kept], t=full.t[kept], drive_unit=data.drive_unit, missing="drop"
+    )
     return thin[float(thin.t[-(-data.warmup // every)]) :]
 
 
 def _off(u: Array, every: int) -> float:
-    """Return how far a drive is from straight lines between every so many of its samples."""
-    places = np.arange(u.size)
-    between = np.interp(places, places[::every], u[::every])[: u.size - every]
-    return float(np.abs(between - u[: u.size - every]).max()) / float(np.ptp(u))
+    """Return how far a drive is from straight lines between every so many of its samples.
+
+    It may jump in the first interval.
+    """
+    places = np.arange(every, u.size - every)
+    between = np.interp(places, np.arange(0, u.size, every), u[::every])
+    return float(np.abs(between - u[places]).max()) / float(np.ptp(u))
 
 
 class _Profile:
