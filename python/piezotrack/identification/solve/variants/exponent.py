@@ -137,9 +137,7 @@ def _thinned(data: Dataset) -> Dataset:
         return data
     full, kept = data.full, slice(None, None, every)
     y = full.y if full.left_out is None else np.where(full.left_out, math.nan, full.y)
-    thin = Dataset(
-        u=u[kept], y=y[kept], t=full.t[kept], drive_unit=data.drive_unit, missing="drop"
-    )
+    thin = Dataset(u=u[kept], y=y[kept], t=full.t[kept], drive_unit=data.drive_unit, missing="drop")
     return thin[float(thin.t[-(-data.warmup // every)]) :]
 
 
