@@ -109,7 +109,7 @@ def identify(
         search; a text, by which it is tied to others, as ``"1.57 * a2"``; or a `Parameter`, which
         has a scale of its search and a prior too. All others are searched, between bounds that the
         record gives; but `b0`, dry friction at reversals, is held at 0, exponents are held at 1,
-        but that of ``"bouc-wen"`` where one from 1.2 to 4.5 lowers the cost by 2 %
+        but that of ``"bouc-wen"`` where one of up to 4.5 lowers the cost by 2 %
         (``{"exponent": 1}`` holds it), and so is the beta of an oscillator: the data determine only
         its products with gamma and delta. ``Parameter()`` searches `b0`. ``step.parameters`` of a
         step response holds a1, a2, b1 and b0, as in section 3.3 of the paper; b1 then fixes the
