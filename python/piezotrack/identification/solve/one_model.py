@@ -17,7 +17,7 @@ from .jump import voltage_of_rest, with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
 from .variants.delay import with_delay_tried
-from .variants.exponent import may_bend, with_exponent_tried
+from .variants.exponent import may_have_exponent, with_exponent_tried
 from .weights import solve_least_squares
 
 if TYPE_CHECKING:
@@ -75,19 +75,20 @@ def identify_model(
         def plain(one: Problem, begun: Structure | None = None) -> Identification:
             return _identify(one, method, run, begun or start)
 
-        def bent(one: Problem, begun: Structure | None = None) -> Identification:
+        def with_exponent(one: Problem, begun: Structure | None = None) -> Identification:
             return _with_exponent(one, plain(one, begun), method, run)
 
         def at_rest() -> Identification:
             fit = with_rest(other, plain, rest)
-            if not may_bend(other, fit):
+            if not may_have_exponent(other, fit):
                 return fit
-            fit_bent = with_rest(other, bent, voltage_of_rest(fit))
-            return fit_bent if fit_bent.cost < (1.0 - GAIN) * fit.cost else fit
+            # From the voltage of rest that the exponent 1 shows: each fit takes longer.
+            better = with_rest(other, with_exponent, voltage_of_rest(fit))
+            return better if better.cost < (1.0 - GAIN) * fit.cost else fit
 
         if rest is not None or any(record.history == "rest" for record in other.records):
             return at_rest()
-        fit = bent(other)
+        fit = with_exponent(other)
         # What is worse than another model without a jump lacks more than that.
         worse = start is not None and fit.cost > start.cost
         return fit if worse or len(other.records) > 1 else with_rest_tried(other, fit, at_rest)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["may_bend", "with_exponent_tried"]
+__all__ = ["may_have_exponent", "with_exponent_tried"]
 
 MODEL, NAME = "bouc-wen", "exponent"
 # Largest exponent, and the factor from one to the next.
@@ -69,7 +69,7 @@ def with_exponent_tried(
     Identification
         The one with the best exponent where that lowers the cost by 2 %.
     """
-    if fit.start is None or not may_bend(problem, fit):
+    if fit.start is None or not may_have_exponent(problem, fit):
         return fit
     (record,) = problem.records
     thin, history = _thinned(record.data), fit.start.history
@@ -88,7 +88,7 @@ def with_exponent_tried(
     return replace(found, method=fit.method, nfev=fit.nfev + found.nfev, details=details)
 
 
-def may_bend(problem: Problem, fit: Identification) -> bool:
+def may_have_exponent(problem: Problem, fit: Identification) -> bool:
     """Return whether another exponent may lower the cost of a fit with 1.
 
     Parameters
