@@ -16,7 +16,7 @@
 //! a closed form too, and another exponential beyond it. For any other exponent power series of the
 //! solution are summed.
 
-use super::power_series::{PowerSeries, RECIPROCAL, TERMS};
+use super::power_series::{PowerSeries, TERMS};
 use super::series::{self, growth, logarithm, power};
 use super::{NonsmoothOperator, Operator};
 use crate::cast::{Cast, rounded};
@@ -216,10 +216,10 @@ impl<N: Number> BoucWen<N> {
         let longest = z.like(SHORT_PIECE) / decay.larger(change * magnitude(slope * inverse));
         let more = (left - longest).where_negative(left, longest);
         let mut series = PowerSeries::new(z, bent);
-        series.push(slope * more);
-        for k in 1..TERMS - 1 {
+        series.integrate(slope * more);
+        for _ in 1..TERMS - 1 {
             let rate = kappa * series.raise(n, inverse);
-            series.push(-rate * more * z.like(RECIPROCAL[k + 1]));
+            series.integrate(-rate * more);
         }
         [series.sum(), more]
     }
@@ -258,9 +258,9 @@ impl<N: Number> BoucWen<N> {
         }
         let mut series = PowerSeries::new(z.like(1.0), z.like(1.0));
         series.push(-s * z.each(parts[1]));
-        for k in 1..TERMS - 1 {
+        for part in &parts[2..TERMS] {
             let power = series.raise(n, z.like(1.0));
-            series.push(-s * power * z.each(parts[k + 1]));
+            series.push(-s * power * z.each(*part));
         }
         [self.rise * to * series.sum(), more]
     }

@@ -6,10 +6,12 @@ use crate::{Number, Real};
 pub(super) const TERMS: usize = 11;
 
 /// A function and its n-th power, with the length of the path in each term.
-pub(super) struct PowerSeries<N> {
+pub(super) struct PowerSeries<N: Number> {
     terms: [N; TERMS],
-    count: usize,
     raised: [N; TERMS],
+    /// Number of the latest term of the function: an index, and a number of a step in any precision.
+    latest: usize,
+    order: N::Lane,
 }
 
 impl<N: Number> PowerSeries<N> {
@@ -17,7 +19,8 @@ impl<N: Number> PowerSeries<N> {
     #[inline(always)]
     pub(super) fn new(first: N, raised: N) -> Self {
         let zero = first.like(0.0);
-        let mut series = Self { terms: [zero; TERMS], count: 1, raised: [zero; TERMS] };
+        let order = N::Lane::ZERO;
+        let mut series = Self { terms: [zero; TERMS], raised: [zero; TERMS], latest: 0, order };
         (series.terms[0], series.raised[0]) = (first, raised);
         series
     }
@@ -25,23 +28,32 @@ impl<N: Number> PowerSeries<N> {
     /// Adds the next term of the function.
     #[inline(always)]
     pub(super) fn push(&mut self, term: N) {
-        self.terms[self.count] = term;
-        self.count += 1;
+        self.latest += 1;
+        self.order = self.order + N::Lane::of(1.0);
+        self.terms[self.latest] = term;
+    }
+
+    /// Adds the next term of the function, whose slope has this latest term.
+    #[inline(always)]
+    pub(super) fn integrate(&mut self, slope: N) {
+        let one = N::Lane::of(1.0);
+        self.push(slope * slope.each(one / (self.order + one)));
     }
 
     /// The next term of the power v of a function z whose first term has the reciprocal `inverse`:
     /// z v' = n v z'.
     #[inline(always)]
     pub(super) fn raise(&mut self, n: N::Lane, inverse: N) -> N {
-        let k = self.count - 1;
+        let (k, one) = (self.latest, N::Lane::of(1.0));
         let zero = inverse.like(0.0);
-        let (mut sum, mut counted) = (zero, zero);
-        for (j, (term, count)) in self.terms.iter().zip(&COUNT).enumerate().take(k + 1).skip(1) {
-            let product = *term * self.raised[k - j];
+        let (mut sum, mut counted, mut count) = (zero, zero, one);
+        for j in 1..=k {
+            let product = self.terms[j] * self.raised[k - j];
             sum = sum + product;
-            counted = product.mul_add(zero.like(*count), counted);
+            counted = product.mul_add(zero.each(count), counted);
+            count = count + one;
         }
-        let share = zero.each(n + N::Lane::of(1.0)) * zero.like(RECIPROCAL[k]);
+        let share = zero.each((n + one) / self.order);
         self.raised[k] = counted.mul_add(share, -sum) * inverse;
         self.raised[k]
     }
@@ -56,25 +68,3 @@ impl<N: Number> PowerSeries<N> {
         sum
     }
 }
-
-/// k
-const COUNT: [f64; TERMS] = {
-    let mut out = [0.0; TERMS];
-    let mut k = 1;
-    while k < TERMS {
-        out[k] = out[k - 1] + 1.0;
-        k += 1;
-    }
-    out
-};
-
-/// 1/k
-pub(super) const RECIPROCAL: [f64; TERMS] = {
-    let mut out = COUNT;
-    let mut k = 1;
-    while k < TERMS {
-        out[k] = 1.0 / out[k];
-        k += 1;
-    }
-    out
-};
