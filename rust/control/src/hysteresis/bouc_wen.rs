@@ -16,8 +16,8 @@
 //! a closed form too, and another exponential beyond it. For any other exponent power series of the
 //! solution are summed.
 
-use super::power_series::{PowerSeries, TERMS};
-use super::series::{self, growth, logarithm, power};
+use super::power_series::{LENGTH, PowerSeries};
+use super::series::{TERMS, growth, logarithm, power};
 use super::{NonsmoothOperator, Operator};
 use crate::cast::{Cast, rounded};
 use crate::error::Result;
@@ -146,7 +146,7 @@ impl<N: Number> BoucWen<N> {
         let side = self.side(z, length);
         let kappa = side.mul_add(self.gamma, self.beta);
         let slope = kappa.mul_add(-z, self.rise);
-        let end = (slope * length).mul_add(growth::<_, { series::TERMS }>(-(kappa * length)), z);
+        let end = (slope * length).mul_add(growth::<_, TERMS>(-(kappa * length)), z);
         let crossed = side * end;
         if !crossed.any_negative() {
             return end;
@@ -156,7 +156,7 @@ impl<N: Number> BoucWen<N> {
         let zero_at = reach * logarithm(-(kappa * reach));
         let rest = length - zero_at;
         let kappa = self.beta - side * self.gamma;
-        let beyond = (self.rise * rest) * growth::<_, { series::TERMS }>(-(kappa * rest));
+        let beyond = (self.rise * rest) * growth::<_, TERMS>(-(kappa * rest));
         crossed.where_negative(beyond, end)
     }
 
@@ -217,7 +217,7 @@ impl<N: Number> BoucWen<N> {
         let more = (left - longest).where_negative(left, longest);
         let mut series = PowerSeries::new(z, bent);
         series.integrate(slope * more);
-        for _ in 1..TERMS - 1 {
+        for _ in 1..LENGTH - 1 {
             let rate = kappa * series.raise(n, inverse);
             series.integrate(-rate * more);
         }
@@ -258,7 +258,7 @@ impl<N: Number> BoucWen<N> {
         }
         let mut series = PowerSeries::new(z.like(1.0), z.like(1.0));
         series.push(-s * z.each(parts[1]));
-        for part in &parts[2..TERMS] {
+        for part in &parts[2..LENGTH] {
             let power = series.raise(n, z.like(1.0));
             series.push(-s * power * z.each(*part));
         }

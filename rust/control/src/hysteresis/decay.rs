@@ -1,6 +1,6 @@
 //! The exponential decay along a path, of any length, in lanes.
 
-use super::series::{RECIPROCAL_FACTORIAL, TERMS, growth};
+use super::series::{GROWTH, growth, polynomial};
 use crate::Number;
 
 /// Longest path for which the series is summed as it is.
@@ -18,7 +18,7 @@ const FEW_TERMS: usize = 10;
 pub(super) fn decay<N: Number>(path: N) -> N {
     let long = path.like(SHORT) - path;
     let part = -long.where_negative(path.like(SHORT), path);
-    let short = part * short_growth(part);
+    let short = part * polynomial(part, &GROWTH);
     if !long.any_negative() {
         return short;
     }
@@ -37,18 +37,4 @@ fn long_decay<N: Number>(path: N) -> N {
         change = change.mul_add(change, change + change);
     }
     change
-}
-
-/// (e^x - 1)/x for |x| up to [`SHORT`], even and odd terms apart: half as long a chain of operations.
-#[inline(always)]
-fn short_growth<N: Number>(x: N) -> N {
-    const { assert!(TERMS.is_multiple_of(2)) };
-    let square = x * x;
-    let term = |k: usize| x.like(RECIPROCAL_FACTORIAL[k]);
-    let (mut even, mut odd) = (term(TERMS - 1), term(TERMS));
-    for k in (1..TERMS - 1).step_by(2).rev() {
-        even = even.mul_add(square, term(k));
-        odd = odd.mul_add(square, term(k + 1));
-    }
-    odd.mul_add(x, even)
 }

@@ -3,12 +3,12 @@
 use crate::{Number, Real};
 
 /// Terms of a series.
-pub(super) const TERMS: usize = 11;
+pub(super) const LENGTH: usize = 11;
 
 /// A function and its n-th power, with the length of the path in each term.
 pub(super) struct PowerSeries<N: Number> {
-    terms: [N; TERMS],
-    raised: [N; TERMS],
+    terms: [N; LENGTH],
+    raised: [N; LENGTH],
     /// Number of the latest term of the function: an index, and a number of a step in any precision.
     latest: usize,
     order: N::Lane,
@@ -20,7 +20,7 @@ impl<N: Number> PowerSeries<N> {
     pub(super) fn new(first: N, raised: N) -> Self {
         let zero = first.like(0.0);
         let order = N::Lane::ZERO;
-        let mut series = Self { terms: [zero; TERMS], raised: [zero; TERMS], latest: 0, order };
+        let mut series = Self { terms: [zero; LENGTH], raised: [zero; LENGTH], latest: 0, order };
         (series.terms[0], series.raised[0]) = (first, raised);
         series
     }
@@ -61,8 +61,8 @@ impl<N: Number> PowerSeries<N> {
     /// The value of the function.
     #[inline(always)]
     pub(super) fn sum(&self) -> N {
-        let mut sum = self.terms[TERMS - 1];
-        for term in self.terms[..TERMS - 1].iter().rev() {
+        let mut sum = self.terms[LENGTH - 1];
+        for term in self.terms[..LENGTH - 1].iter().rev() {
             sum = sum + *term;
         }
         sum

@@ -56,7 +56,7 @@ pub(super) fn power<N: Number>(x: N, a: N::Lane) -> N {
 
 /// A polynomial, even and odd terms apart: half as long a chain of operations.
 #[inline(always)]
-fn polynomial<N: Number, const TERMS: usize>(x: N, terms: &[f64; TERMS]) -> N {
+pub(super) fn polynomial<N: Number, const TERMS: usize>(x: N, terms: &[f64; TERMS]) -> N {
     const { assert!(TERMS.is_multiple_of(2)) };
     let square = x * x;
     let (mut even, mut odd) = (x.like(terms[TERMS - 2]), x.like(terms[TERMS - 1]));
@@ -85,6 +85,17 @@ const EXP2: [f64; 14] = {
     while k < out.len() {
         out[k] = power * RECIPROCAL_FACTORIAL[k + 1];
         power *= LN_2;
+        k += 1;
+    }
+    out
+};
+
+/// (e^x - 1)/x, for |x| up to 1/2.
+pub(super) const GROWTH: [f64; TERMS] = {
+    let mut out = [0.0; TERMS];
+    let mut k = 0;
+    while k < TERMS {
+        out[k] = RECIPROCAL_FACTORIAL[k + 1];
         k += 1;
     }
     out
