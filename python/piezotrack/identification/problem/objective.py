@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -168,6 +169,16 @@ class Objective:
             np.array([nfev for _, _, nfev in descents]),
         )
 
+    def _place(self, values: Mapping[str, float]) -> list[float]:
+        """Return the place of values of the free parameters, SI; in the middle where none is given.
+
+        It is the nearest one in the unit box.
+        """
+        return [
+            _coordinate(values[name], low, high, scale) if name in values else 0.5
+            for name, low, high, scale in self.coordinates
+        ]
+
     def parameters(self, place: ArrayLike) -> dict[str, float]:
         """Return the parameters of the stage at a place of the unit box, SI.
 
@@ -188,6 +199,13 @@ class Objective:
         """
         (row,) = _rows(place)
         return dict(zip(self._scalars, self._core.parameters(row), strict=False))
+
+
+def _coordinate(value: float, low: float, high: float, scale: str) -> float:
+    """Return the coordinate of a value in the unit box, the nearest to one outside."""
+    if scale == "log" and value > 0.0:
+        low, high, value = math.log(low), math.log(high), math.log(value)
+    return min(max((value - low) / (high - low), 0.0), 1.0)
 
 
 def _rows(places: ArrayLike) -> list[list[float]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -149,17 +148,10 @@ def starts(objective: Objective, fit: Identification) -> Array:
 def _places(objective: Objective, fit: Identification) -> Array:
     """Places with the parameters of the fit: after each voltage of a grid where one is searched."""
     names = list(objective.ranges)
-    place = [0.5 if one[0] == VOLTAGE else _coordinate(fit, *one) for one in objective.coordinates]
+    values = {name: one.value for name, one in fit.parameters.items() if name != VOLTAGE}
+    place = objective._place(values)
     if VOLTAGE not in names:
         return np.array([place])
     places = np.tile(place, (GRID, 1))
     places[:, names.index(VOLTAGE)] = (np.arange(GRID) + 0.5) / GRID
     return places
-
-
-def _coordinate(fit: Identification, name: str, low: float, high: float, scale: str) -> float:
-    """Coordinate of a parameter in the unit box."""
-    value = fit.parameters[name].value
-    if scale == "log" and value > 0.0:
-        low, high, value = math.log(low), math.log(high), math.log(value)
-    return min(max((value - low) / (high - low), 0.0), 1.0)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ... import _core
 from ...errors import ParameterError
 from ..fitted.model_entries import origin_of, provenance
 from ..fitted.notes import carried_by_first_samples
@@ -26,12 +27,13 @@ if TYPE_CHECKING:
 
     Identify = Callable[[Problem, Structure | None], Identification]
 
-__all__ = ["voltage_of_rest", "with_rest", "with_rest_tried"]
+__all__ = ["preceded", "voltage_of_rest", "with_rest", "with_rest_tried"]
 
 # Voltages of rest with a fit each, spread and about the best of these.
 COARSE, ABOUT = 9, 6
-# Samples of the beginning of a record on which they are compared.
-FIRST = 1500
+# Samples of the beginning of a record on which they are compared: so many, or twice those up to
+# where the drive has reversed by such a share of its range.
+FIRST, REVERSED = 1500, 0.1
 # Ratio of residuals of the beginning that are alike, how many of their voltages are tried on the
 # whole record, and ratio of its residual to that of the beginning that ends this.
 ALIKE, TRIED, APART = 1.1, 3, 1.5
@@ -168,6 +170,28 @@ def best_voltage(fit: Identification, data: Dataset) -> float | None:
     return volts if cost(volts) < (1.0 - GAIN) * cost(voltage_of_rest(fit) or 0.0) else None
 
 
+def preceded(problem: Problem, volts: float) -> Problem:
+    """Put a stage at rest before the drive jumps to the first sample.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem, of one record.
+    volts : float
+        Voltage of rest [V].
+
+    Returns
+    -------
+    Problem
+        With a record that begins at rest, whose window begins after the jump.
+    """
+    (record,) = problem.records
+    before = record.data._preceded(volts)
+    begin = before.t[0] if record.data.warmup else before.full.t[2]
+    at_rest = replace(record, data=before[float(begin) :], history="virgin")
+    return replace(problem, records=(at_rest,))
+
+
 def _begins_apart(fit: Identification, data: Dataset) -> bool:
     """Return whether the first samples carry the residual, or the very first what is not noise."""
     left = _left(fit, data)
@@ -199,18 +223,16 @@ def _begun(problem: Problem) -> Problem:
 
 def _first(data: Dataset) -> Dataset:
     """Return the first part of a long record."""
-    return data if len(data) <= FIRST else data[: float(data.t[FIRST])]
+    turns = _core.turns(data.u, REVERSED * float(np.ptp(data.u)))
+    last = max(FIRST, 2 * turns[0]) if turns else len(data)
+    return data if len(data) <= last else data[: float(data.t[last])]
 
 
 def _at_rest(
     problem: Problem, identify: Identify, volts: float, start: Structure | None = None
 ) -> Identification:
-    (record,) = problem.records
-    data = record.data
-    before = data._preceded(volts)
-    begin = before.t[0] if data.warmup else before.full.t[2]
-    preceded = replace(record, data=before[float(begin) :], history="virgin")
-    fit = identify(replace(problem, records=(preceded,)), start)
+    data = problem.records[0].data
+    fit = identify(preceded(problem, volts), start)
     judged = data if data.warmup else data[float(data.t[1]) :]
     at_jump = start_at_jump(fit.model, data, volts)
     own = replace(fit.records[0], data=judged, start=at_jump, origin=origin_of(judged))

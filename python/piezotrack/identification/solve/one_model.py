@@ -17,11 +17,12 @@ from .jump import voltage_of_rest, with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
 from .variants.delay import with_delay_tried
+from .variants.drift import with_drift_tried, with_drifts_of
 from .variants.exponent import may_have_exponent, with_exponent_tried
 from .weights import solve_least_squares
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from ..fitted.identification import Identification
     from ..fitted.start import History
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from ..problem.problem import Problem
     from .run import Run
     from .weights import Structure
+
+    Solve = Callable[[Problem], Identification]
 
 __all__ = ["identify_model", "weights_of"]
 
@@ -78,22 +81,31 @@ def identify_model(
         def with_exponent(one: Problem, begun: Structure | None = None) -> Identification:
             return _with_exponent(one, plain(one, begun), method, run)
 
+        def with_drift(solved: Identification, search: Solve) -> tuple[Problem, Identification]:
+            if isinstance(method, LeastSquares):
+                return other, solved
+            solved = with_drift_tried(other, solved, search)
+            return with_drifts_of(other, solved), solved
+
         def at_rest() -> Identification:
             fit = with_rest(other, plain, rest)
-            if not may_have_exponent(other, fit):
-                return fit
             # From the voltage of rest that the exponent 1 shows: each fit takes longer.
-            better = with_rest(other, with_exponent, voltage_of_rest(fit))
+            shown = voltage_of_rest(fit)
+            drifting, fit = with_drift(fit, lambda one: with_rest(one, plain, shown))
+            if not may_have_exponent(drifting, fit):
+                return fit
+            better = with_rest(drifting, with_exponent, voltage_of_rest(fit))
             return better if better.cost < (1.0 - GAIN) * fit.cost else fit
 
         if rest is not None or any(record.history == "rest" for record in other.records):
             return at_rest()
-        fit = with_exponent(other)
+        drifting, fit = with_drift(plain(other), plain)
+        fit = _with_exponent(drifting, fit, method, run)
         # What is worse than another model without a jump lacks more than that.
         worse = start is not None and fit.cost > start.cost
         return fit if worse or len(other.records) > 1 else with_rest_tried(other, fit, at_rest)
 
-    return with_delay_tried(problem, method, start, rest, identify)
+    return with_delay_tried(problem, method, start, rest, identify, run.threads)
 
 
 def _identify(

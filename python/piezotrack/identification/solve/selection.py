@@ -134,12 +134,13 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     with shares.begin(len(infos)):
         fit = whole(best, best.start)
         noise = max(noise_of(record.data) for record in problem.records)
-        one = trials.of_few_values(best)
+        one = trials.of_few_values(best, fit)
         if one is not None and fit.cost > HARDLY_MORE * min(fit.noises):
             # Few values that describe the whole record as well as many weights do predict more.
             with suppress(DataError, NumericalError):
                 of_model = _as_shown(problem, Structure.of(fit)).of_model(one.info)
-                other = identify_model(of_model, methods.method(one.info), run)
+                rest = voltage_of_rest(fit)
+                other = identify_model(of_model, methods.method(one.info), run, rest=rest)
                 if other.cost < (1.0 - BETTER) * fit.cost:
                     best, fit = one, other
         if best.info.name == MANY_WEIGHTS or fit.cost > NOTHING_BUT_NOISE * noise:
@@ -194,10 +195,9 @@ class _Trials:
     # Least residual so far, in multiples of the noise, on what was not fitted and on what was.
     least: float = math.inf
     fitted: float = math.inf
-    # Structure of the first fit by least squares, which records have a delay in it, and the voltage
-    # of rest from which the drive jumped.
+    # Structure of the first fit by least squares, and the voltage of rest from which the drive
+    # jumped.
     start: Structure | None = None
-    delayed: list[bool] = field(default_factory=list)
     rest: float | None = None
     # Models found by least squares, and those of them that are fitted in threads.
     by_weights: list[ModelInfo] = field(default_factory=list)
@@ -217,16 +217,26 @@ class _Trials:
 
     def whole(self, problem: Problem, info: ModelInfo) -> Problem:
         """Return the problem of a model on the whole records, with the delays that were shown."""
-        shown = any(self.delayed) and not info.searched
-        return self.of_model(_with_delays(problem, self.delayed) if shown else problem, info)
+        shown = self.start is not None and any(self.start.delayed)
+        return self.of_model(problem, info) if shown or info.searched else problem.of_model(info)
 
     def of_model(self, problem: Problem, info: ModelInfo) -> Problem:
-        """Return the problem of a model; what least squares have shown is in searched ones too."""
-        return (_as_shown(problem, self.start) if info.searched else problem).of_model(info)
+        """Return the problem of a model, with what the first fit by least squares has shown."""
+        if self.start is None:
+            return problem.of_model(info)
+        shown = _as_shown if info.searched else _with_delays
+        return shown(problem, self.start).of_model(info)
 
-    def of_few_values(self, best: Tried) -> Tried | None:
-        """Return the trial of the model of few values, where it comes near a best one of many."""
-        if best.info.searched or self.least <= NOTHING_BUT_NOISE or not self.near_best(FEW_VALUES):
+    def of_few_values(self, best: Tried, whole: Identification) -> Tried | None:
+        """Return the trial of the model of few values, where it may be better than one of many.
+
+        It is near the best one, or was judged with a drift in what was not fitted.
+        """
+        if best.start is None or self.least <= NOTHING_BUT_NOISE:
+            return None
+        pairs = zip(whole.records, best.start.drifts, strict=True)
+        drifts = any(record.drift and not before for record, before in pairs)
+        if not drifts and not self.near_best(FEW_VALUES):
             return None
         return next((one for one in self.found if one.info.name == FEW_VALUES), None)
 
@@ -273,8 +283,6 @@ class _Trials:
             # whether they begin with a jump: one that is not may take for a jump what it lacks.
             if fit.cost < NEAR_NOISE * min(fit.noises):
                 self.rest = voltage_of_rest(fit)
-            self.delayed = [record.delay != 0.0 for record in fit.records]
-            self.problem = _with_delays(self.problem, self.delayed)
         records = self.problem.records
         counts = np.array(
             [one.weight * len(rest) for one, rest in zip(records, self.rests, strict=True)]
@@ -314,26 +322,24 @@ class _Trials:
         return _Attempt(fit, left, ill, time.perf_counter() - begun)
 
 
-def _with_delays(problem: Problem, shown: list[bool]) -> Problem:
-    """Fit a delay where nothing is given and one is shown, and none elsewhere."""
+def _with_delays(problem: Problem, start: Structure) -> Problem:
+    """Fit a delay where nothing is given and a fit has one, and none elsewhere."""
     records = tuple(
         replace(record, delay=delayed) if record.delay is None else record
-        for record, delayed in zip(problem.records, shown, strict=True)
+        for record, delayed in zip(problem.records, start.delayed, strict=True)
     )
     return replace(problem, records=records)
 
 
-def _as_shown(problem: Problem, start: Structure | None) -> Problem:
-    """Return a problem with the creep and the drifts of a fit where nothing is said of them."""
-    if start is None:
-        return problem
+def _as_shown(problem: Problem, start: Structure) -> Problem:
+    """Return a problem with the creep, drifts and delays of a fit where none are given."""
     if problem.creep is None and start.creep_times:
         problem = replace(problem, creep=tuple(start.creep_times))
     records = tuple(
         replace(record, drift=True) if record.drift is None and time is not None else record
         for record, time in zip(problem.records, start.drifts, strict=True)
     )
-    return replace(problem, records=records)
+    return _with_delays(replace(problem, records=records), start)
 
 
 def best_of(tried: Sequence[Tried], better: float = BETTER) -> Tried:

@@ -53,6 +53,7 @@ class Structure:
 
     histories: list[str]
     drifts: list[float | None]
+    delayed: list[bool]
     creep_times: list[float]
     dynamics: list[float]
     # Residual that the other fit leaves without a jump of the drive to the first sample [m].
@@ -76,6 +77,7 @@ class Structure:
                 for one in fit.records
             ],
             drifts=[one.drift.time if one.drift else None for one in fit.records],
+            delayed=[one.delay != 0.0 for one in fit.records],
             creep_times=[time for weight, time in creep if weight > 0.0],
             dynamics=[*(one for one in main if one is not None), *chain(*modes)],
             cost=math.inf if jumped else fit.cost,

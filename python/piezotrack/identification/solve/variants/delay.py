@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING
 
 from ....errors import DataError, NumericalError
 from ...methods.least_squares import LeastSquares
-from ..jump import voltage_of_rest
+from ...problem.objective import Objective
+from ..jump import preceded, voltage_of_rest
 from ..weights import Structure
+from .drift import with_drifts_of
+from .exponent import with_exponent_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,6 +20,8 @@ if TYPE_CHECKING:
     from ...methods.choice import Method
     from ...problem.problem import Problem
 
+    Identify = Callable[[Problem, Structure | None, float | None], Identification]
+
 __all__ = ["with_delay_tried"]
 
 # Share of the cost that a delay has to take away: creep and a lag turn the phase as it does.
@@ -24,6 +29,8 @@ GAIN = 0.05
 # A residual of so many times the noise has hardly anything but noise in it; up to so many times, a
 # delay changes its structure little, and beyond, where it takes away such a share within it.
 NOISY, NEAR, SIGN = 1.05, 1.5, 0.01
+# Delays from which descents beside a search begin, in samples.
+BEGUN = (1.0, 5.0)
 
 
 def with_delay_tried(
@@ -31,7 +38,8 @@ def with_delay_tried(
     method: Method,
     start: Structure | None,
     rest: float | None,
-    identify: Callable[[Problem, Structure | None, float | None], Identification],
+    identify: Identify,
+    threads: int,
 ) -> Identification:
     """Solve a problem, with a delay of each record where nothing is given and one is shown.
 
@@ -40,13 +48,16 @@ def with_delay_tried(
     problem : Problem
         The problem.
     method : Descents, ParticleSwarm or LeastSquares
-        Its method; delays are tried by least squares whose dynamics are chosen from the record.
+        Its method. Delays are tried by least squares whose dynamics are chosen from the record,
+        and by a search of one record where a descent beside its result shows one.
     start : Structure, optional
         Structure that least squares begin with.
     rest : float or None
         Voltage of rest [V] that another model has shown.
     identify : callable
         What solves a problem from a structure, and from a voltage of rest.
+    threads : int
+        All cores where it is 0.
 
     Returns
     -------
@@ -55,20 +66,44 @@ def with_delay_tried(
     """
     fit = identify(problem, start, rest)
     given = any(record.delay is not None for record in problem.records)
-    if given or not isinstance(method, LeastSquares) or method.dynamics != "auto":
-        return fit
-    noise = min(fit.noises)
-    if fit.cost <= NOISY * noise:
+    if given or fit.cost <= NOISY * min(fit.noises):
         return fit
     records = tuple(replace(record, delay=True) for record in problem.records)
-    delayed, rest = replace(problem, records=records), voltage_of_rest(fit)
-    least = (1.0 - GAIN) * fit.cost
+    delayed = replace(problem, records=records)
     try:
-        kept = start is not None and start.kept
-        late = identify(delayed, Structure.of(fit, kept=kept), rest)
-        shown = least if fit.cost < NEAR * noise else (1.0 - SIGN) * fit.cost
-        if start is None and late.cost < shown:
-            late = min(late, identify(delayed, None, rest), key=lambda one: one.cost)
+        if not isinstance(method, LeastSquares):
+            shown = len(records) == 1 and _shows_delay(delayed, fit, threads)
+            late = identify(delayed, None, voltage_of_rest(fit)) if shown else fit
+        else:
+            late = _by_weights(delayed, fit, start, identify) if method.dynamics == "auto" else fit
     except (DataError, NumericalError):
         return fit
-    return late if late.cost < least else fit
+    return late if late.cost < (1.0 - GAIN) * fit.cost else fit
+
+
+def _by_weights(
+    delayed: Problem, fit: Identification, start: Structure | None, identify: Identify
+) -> Identification:
+    """Fit delays from the structure of a fit, and anew where they change it."""
+    rest = voltage_of_rest(fit)
+    late = identify(delayed, Structure.of(fit, kept=start is not None and start.kept), rest)
+    share = GAIN if fit.cost < NEAR * min(fit.noises) else SIGN
+    if start is None and late.cost < (1.0 - share) * fit.cost:
+        late = min(late, identify(delayed, None, rest), key=lambda one: one.cost)
+    return late
+
+
+def _shows_delay(delayed: Problem, fit: Identification, threads: int) -> bool:
+    """Return whether descents with a delay from the result of a search lower its cost by 5 %."""
+    near = with_exponent_of(with_drifts_of(delayed, fit), fit)
+    (record,) = near.records
+    rest, start = voltage_of_rest(fit), fit.start
+    if rest is not None:
+        near = preceded(near, rest)
+    elif start is not None:
+        near = replace(near, records=(replace(record, history=start.history),))
+    objective = Objective._of(near, threads)
+    values = {name: one.value for name, one in fit.parameters.items()}
+    begun = [{**values, "delay": samples * record.data.dt} for samples in BEGUN]
+    costs = objective.descend([objective._place(one) for one in begun])[1]
+    return float(costs.min()) < (1.0 - GAIN) * fit.cost

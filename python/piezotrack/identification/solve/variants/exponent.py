@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["may_have_exponent", "with_exponent_tried"]
+__all__ = ["may_have_exponent", "with_exponent_of", "with_exponent_tried"]
 
 MODEL, NAME = "bouc-wen", "exponent"
 # Largest exponent, and the factor from one to the next.
@@ -217,11 +217,7 @@ class _Profile:
         """Descend with the exponent `n` from where that with another one ended; return the cost."""
         objective = Objective._of(held(self.problem, n), self.threads)
         known = self.alike(start, n)
-        place = [
-            coordinate(known[name], low, high, kind)
-            for name, low, high, kind in objective.coordinates
-        ]
-        places, costs, _ = objective.descend(place)
+        places, costs, _ = objective.descend(objective._place(known))
         free = {
             name: value_at(part, low, high, kind)
             for part, (name, low, high, kind) in zip(places[0], objective.coordinates, strict=True)
@@ -244,12 +240,9 @@ class _Profile:
                 near[name] = Parameter(bounds=bounds)
         few = Descents(samples=2, starts=2, rounds=1)
         refined = search(replace(problem, parameters=near), few)
-        start = [
-            coordinate(refined.parameters[name].value, low, high, kind)
-            for name, low, high, kind in objective.coordinates
-        ]
+        start = {name: one.value for name, one in refined.parameters.items()}
         # What ends on a narrow bound, or beside the minimum, is searched as all others are.
-        lowest = float(objective.descend(start)[1][0])
+        lowest = float(objective.descend(objective._place(start))[1][0])
         if refined.cost > (1.0 + WORSE) * lowest:
             refined = search(problem, None)
         return self.described(refined, objective)
@@ -272,16 +265,27 @@ class _Profile:
         return replace(fit, parameters=parameters, details={**fit.details, "parameters": entries})
 
 
+def with_exponent_of(problem: Problem, fit: Identification) -> Problem:
+    """Hold the exponent of a problem at that of a result, if it was tried.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    fit : Identification
+        Its result.
+
+    Returns
+    -------
+    Problem
+        The problem with the exponent held.
+    """
+    return held(problem, fit.parameters[NAME].value) if _is_free(problem) else problem
+
+
 def held(problem: Problem, n: float) -> Problem:
     """Hold the exponent of a problem."""
     return replace(problem, parameters={**problem.parameters, NAME: Parameter(n)})
-
-
-def coordinate(value: float, low: float, high: float, scale: str) -> float:
-    """Return the coordinate of a value in the unit box, the nearest to one outside."""
-    if scale == "log" and value > 0.0:
-        low, high, value = math.log(low), math.log(high), math.log(value)
-    return min(max((value - low) / (high - low), 0.0), 1.0)
 
 
 def value_at(part: float, low: float, high: float, scale: str) -> float:

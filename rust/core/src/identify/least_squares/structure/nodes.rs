@@ -116,10 +116,21 @@ pub(super) fn add_once(fit: &mut Fit<'_>, gain: f64) -> Option<()> {
         Nodes::Levels | Nodes::None => return Some(()),
     }
     trial.settle(ROUGH)?;
-    if trial.rms < (1.0 - gain) * fit.rms {
+    if trial.rms < (1.0 - gain) * fit.rms && !hardly_moves(&trial) {
         *fit = trial;
     }
     Some(())
+}
+
+/// Whether the play that moves once has more than twice the slope of the whole stage: a drive that
+/// begins in the middle of its range moves it by rounding errors.
+fn hardly_moves(fit: &Fit<'_>) -> bool {
+    let common = fit.common;
+    let most = common.stroke / reach(common);
+    let weights = &fit.x[fit.layout().weights()];
+    common.of.nodes() == Nodes::Thresholds
+        && has_once(fit)
+        && weights.last().is_some_and(|weight| *weight > most)
 }
 
 /// Leaves out the plays or relays that move once where they explain too little beside what was
@@ -131,7 +142,7 @@ pub(super) fn drop_once(fit: &mut Fit<'_>, settings: &Settings) -> Option<()> {
     let mut bare = fit.clone();
     bare.restructure(|bare| bare.nodes.retain(|node| !moves_once(fit.common, *node)));
     bare.settle(ROUGH)?;
-    if (1.0 - HISTORY_GAIN) * bare.rms <= fit.rms {
+    if (1.0 - HISTORY_GAIN) * bare.rms <= fit.rms || hardly_moves(fit) {
         *fit = bare;
     }
     Some(())
