@@ -47,6 +47,15 @@ def test_a_delay_is_found(delay: float) -> None:
     assert fit.fitted.rms == pytest.approx(fit.cost, rel=1e-3)
 
 
+@pytest.mark.parametrize("delay", [0.0, 3.45e-3])
+def test_a_search_finds_a_delay_that_is_not_given(delay: float) -> None:
+    u, y = late(delay)
+    noise = 10e-9 * np.random.default_rng(2).standard_normal(y.size)
+    fit = pt.identify(pt.Dataset(u=u, y=y + noise, dt=DT), "dahl", parameters=HELD)
+    assert fit.cost < 10.5e-9
+    assert fit.delay == pytest.approx(delay, abs=5e-6)
+
+
 def test_a_known_delay_is_used_and_bounds_are_kept() -> None:
     u, y = late(3.45e-3)
     data = pt.Dataset(u=u, y=y, dt=DT)

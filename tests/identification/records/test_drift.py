@@ -73,6 +73,17 @@ def test_finds_the_drift_and_the_stage() -> None:
 
 
 @pytest.mark.slow
+def test_a_searched_model_finds_a_drift_that_is_not_given() -> None:
+    fit = with_drift(record(drift=(6e-7, 12.0)), drift=None)
+    assert fit.drift == drifting().drift
+    assert fit.cost == drifting().cost
+    # An error of the model is not taken for one, nor is noise.
+    simple = pt.identify(record(), "first-order-dahl", history="virgin")
+    assert simple.cost > 2.0 * NOISE
+    assert simple.drift is None
+    assert with_drift(record(), drift=None).drift is None
+
+
 def test_the_time_constant_has_a_standard_deviation() -> None:
     """Of twelve records with other noise the time constants spread by it."""
     fits = [with_drift(record(drift=(6e-7, 12.0), seed=seed)) for seed in range(12)]

@@ -102,6 +102,32 @@ def test_the_voltage_of_rest_is_found() -> None:
     assert fit.cost < 1.1 * NOISE
 
 
+def test_the_voltage_of_rest_is_found_where_the_drive_reverses_late() -> None:
+    # Its first reversal is the 2001st sample; it comes from rest in the middle of its range.
+    u = 50.0 * np.cos(np.pi * T / T[2000])
+    x = STAGE.simulate(np.concatenate(([12.0], u)), DT, initial=STAGE.equilibrium(12.0)).x[1:]
+    log = pt.Dataset(u=u, y=x + NOISE * np.random.default_rng(0).normal(size=u.size), dt=DT)
+    fit = pt.identify(log, "prandtl-ishlinskii")
+    assert fit.start.voltage == pytest.approx(12.0, abs=2.0)
+    assert fit.cost < 1.2 * NOISE
+
+
+def test_a_play_that_a_jump_alone_moves_has_no_weight_of_rounding_errors() -> None:
+    # From the middle of its range the drive reaches half of it, but for rounding, in each period.
+    u = 50.0 * np.cos(np.pi * T / 0.9973)
+    rest, late = -3.0, 0.4e-3
+    before = np.concatenate((np.full(10, rest), u))
+    x = STAGE.simulate(before, DT, initial=STAGE.equilibrium(rest)).x
+    t = DT * np.arange(-10, u.size)
+    y = np.interp(T - late, t, x) + NOISE * np.random.default_rng(0).normal(size=u.size)
+    log = pt.Dataset(u=u, y=y, dt=DT)
+    fit = pt.identify(log[:2.5], "prandtl-ishlinskii")
+    assert fit.delay == pytest.approx(late, abs=0.05e-3)
+    assert max(fit.model.weights) < 2e-7
+    later = log[2.5:]
+    assert np.std(later.y - fit.simulate(later, offset=fit.offset).x) < 1.2 * NOISE
+
+
 def test_the_voltage_of_rest_is_found_beside_a_drift() -> None:
     """Between the voltages that are tried first, where the weights stand for what is missed."""
     log = jumping(before=40.0)

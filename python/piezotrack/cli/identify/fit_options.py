@@ -195,14 +195,14 @@ class RecordOptions:
     sensor_delay: Annotated[
         list[str] | None,
         Option(
-            "Delay of the sensor; default none if searched, else by the log",
+            "Delay of the sensor; default by the log",
             metavar="none|fit|TIME|LOW:HIGH",
         ),
     ] = None
     drift: Annotated[
         list[str] | None,
         Option(
-            "Sensor drift, or its time constant; default none if searched, else by the log",
+            "Sensor drift, or its time constant; default by the log",
             metavar="none|fit|TIME",
         ),
     ] = None

@@ -85,11 +85,14 @@ def _by_weights(
     delayed: Problem, fit: Identification, start: Structure | None, identify: Identify
 ) -> Identification:
     """Fit delays from the structure of a fit, and anew where they change it."""
-    rest = voltage_of_rest(fit)
+    rest, near = voltage_of_rest(fit), NEAR * min(fit.noises)
     late = identify(delayed, Structure.of(fit, kept=start is not None and start.kept), rest)
-    share = GAIN if fit.cost < NEAR * min(fit.noises) else SIGN
+    share = GAIN if fit.cost < near else SIGN
     if start is None and late.cost < (1.0 - share) * fit.cost:
         late = min(late, identify(delayed, None, rest), key=lambda one: one.cost)
+        if rest is not None and late.cost > near:
+            # Without the delay, another voltage of rest stands for it.
+            late = min(late, identify(delayed, None, None), key=lambda one: one.cost)
     return late
 
 
