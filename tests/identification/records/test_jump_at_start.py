@@ -108,6 +108,7 @@ def test_the_voltage_of_rest_is_found_where_the_drive_reverses_late() -> None:
     x = STAGE.simulate(np.concatenate(([12.0], u)), DT, initial=STAGE.equilibrium(12.0)).x[1:]
     log = pt.Dataset(u=u, y=x + NOISE * np.random.default_rng(0).normal(size=u.size), dt=DT)
     fit = pt.identify(log, "prandtl-ishlinskii")
+    assert fit.start is not None
     assert fit.start.voltage == pytest.approx(12.0, abs=2.0)
     assert fit.cost < 1.2 * NOISE
 

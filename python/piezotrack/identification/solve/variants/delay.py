@@ -90,9 +90,9 @@ def _by_weights(
     share = GAIN if fit.cost < near else SIGN
     if start is None and late.cost < (1.0 - share) * fit.cost:
         late = min(late, identify(delayed, None, rest), key=lambda one: one.cost)
-        if rest is not None and late.cost > near:
-            # Without the delay, another voltage of rest stands for it.
-            late = min(late, identify(delayed, None, None), key=lambda one: one.cost)
+    if start is None and rest is not None and late.cost > near:
+        # Another voltage of rest may stand for the delay.
+        late = min(late, identify(delayed, None, 0.0), key=lambda one: one.cost)
     return late
 
 

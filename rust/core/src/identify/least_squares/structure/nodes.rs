@@ -29,6 +29,9 @@ const TRIED: [(usize, f64); 3] = [(PLAYS, 1.0), (PLAYS, 1.5), (MANY_PLAYS, 1.0)]
 /// As many as there can be, and one.
 const MANY_PLAYS: usize = MOST_PLAYS - 1;
 
+/// Least travel of a play that moves once, as a share of its threshold.
+const LEAST_TRAVEL: f64 = 0.01;
+
 /// Rounds in which plays are gathered: each halves the distance between neighbours.
 const ROUNDS: usize = 5;
 
@@ -122,11 +125,11 @@ pub(super) fn add_once(fit: &mut Fit<'_>, gain: f64) -> Option<()> {
     Some(())
 }
 
-/// Whether the play that moves once has more than twice the slope of the whole stage: a drive that
-/// begins in the middle of its range moves it by rounding errors.
+/// Whether the play that moves once hardly moves, by the weight that it has: a drive that begins in
+/// the middle of its range moves it by rounding errors.
 fn hardly_moves(fit: &Fit<'_>) -> bool {
     let common = fit.common;
-    let most = common.stroke / reach(common);
+    let most = common.stroke / (LEAST_TRAVEL * reach(common));
     let weights = &fit.x[fit.layout().weights()];
     common.of.nodes() == Nodes::Thresholds
         && has_once(fit)
