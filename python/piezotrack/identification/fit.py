@@ -133,9 +133,10 @@ def identify(
     delay : bool, float or (float, float), optional
         Delay of the displacement with respect to the drive [s], as amplifiers and slow sensor
         readings cause it: none (False), fitted (True), known (a number), or fitted between two
-        bounds. Where it is not given: fitted where that lowers the cost by 5 %; in a search of
-        several records none. Under one slow sine the effect of a delay is that of damping; a drive
-        of several frequencies separates the two. Several records have delays of their own.
+        bounds. Where it is not given: fitted where that lowers the cost by 5 %; by a swarm, and in
+        a search of several records, none. Under one slow sine the effect of a delay is that of
+        damping; a drive of several frequencies separates the two. Several records have delays of
+        their own.
     drift : bool or float, optional
         Slow drift of the sensor along the record, ``d exp(-t/tau)``, its amplitude fitted: none
         (False), with a time constant that the record shows (True), or with this one [s]. A record

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ....errors import DataError, NumericalError
+from ...methods.descents import Descents
 from ...methods.least_squares import LeastSquares
 from ...problem.objective import Objective
 from ..jump import preceded, voltage_of_rest
@@ -49,7 +50,7 @@ def with_delay_tried(
         The problem.
     method : Descents, ParticleSwarm or LeastSquares
         Its method. Delays are tried by least squares whose dynamics are chosen from the record,
-        and by a search of one record where a descent beside its result shows one.
+        and by descents for one record where those beside the result show one.
     start : Structure, optional
         Structure that least squares begin with.
     rest : float or None
@@ -71,11 +72,12 @@ def with_delay_tried(
     records = tuple(replace(record, delay=True) for record in problem.records)
     delayed = replace(problem, records=records)
     try:
-        if not isinstance(method, LeastSquares):
-            shown = len(records) == 1 and _shows_delay(delayed, fit, threads)
-            late = identify(delayed, None, voltage_of_rest(fit)) if shown else fit
+        if isinstance(method, LeastSquares) and method.dynamics == "auto":
+            late = _by_weights(delayed, fit, start, identify)
+        elif isinstance(method, Descents) and _shows_delay(delayed, fit, threads):
+            late = identify(delayed, None, voltage_of_rest(fit))
         else:
-            late = _by_weights(delayed, fit, start, identify) if method.dynamics == "auto" else fit
+            return fit
     except (DataError, NumericalError):
         return fit
     return late if late.cost < (1.0 - GAIN) * fit.cost else fit
@@ -97,7 +99,9 @@ def _by_weights(
 
 
 def _shows_delay(delayed: Problem, fit: Identification, threads: int) -> bool:
-    """Return whether descents with a delay from the result of a search lower its cost by 5 %."""
+    """Return whether a delay lowers the cost of one record by 5 % beside the result of a search."""
+    if len(delayed.records) > 1:
+        return False
     near = with_exponent_of(with_drifts_of(delayed, fit), fit)
     (record,) = near.records
     rest, start = voltage_of_rest(fit), fit.start
