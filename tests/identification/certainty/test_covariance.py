@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +13,7 @@ from scipy.signal import lfilter
 import piezotrack as pt
 from piezotrack import _core
 from piezotrack.errors import ParameterError
-
-if TYPE_CHECKING:
-    from piezotrack.identification.fitted.certainty.covariance import Covariance
+from piezotrack.identification.fitted.certainty.covariance import Covariance
 
 DT = 4e-3
 THRESHOLDS = (5.0, 15.0, 30.0)
@@ -226,3 +224,34 @@ def test_the_noise_is_that_of_the_largest_restricted_likelihood() -> None:
     alone, power = _core.autoregression(residual)
     least = power * take @ correlations(np.array(alone)) @ take.T
     assert np.all(np.diag(least) < 0.8 * np.diag(expected))
+
+
+def test_values_whose_unit_the_exponent_decides_have_intervals_in_the_logarithm() -> None:
+    # z^n keeps its size where ln(beta) changes by -ln(z) times the change of n, of z in m.
+    exponent, beta, deviation, slope = 2.0, 1.5e4, 0.08, -np.log(3e-5)
+    zeros, ones = np.zeros(2), np.ones(2)
+    covered = []
+    for moved in deviation * np.random.default_rng(0).standard_normal(2000):
+        found = beta * np.exp(slope * moved)
+        effect = np.array([1.0, slope * found])
+        covariance = Covariance(
+            names=("exponent", "beta"),
+            values=np.array([exponent + moved, found]),
+            matrix=deviation**2 * np.outer(effect, effect),
+            determined=ones > 0.0,
+            independent=ones,
+            factors=ones,
+            widening=ones,
+            shifts=np.zeros((2, 2)),
+            to_least_cost=zeros,
+            by_held=np.zeros((2, 2)),
+            samples=2000,
+            orders=(0,),
+            hidden=np.empty((0, 2)),
+            predicted=0.0,
+        )
+        low, high = covariance.interval("beta")
+        covered.append(low < beta < high)
+        low, high = covariance.interval("exponent")
+        assert high - low == pytest.approx(2.0 * 1.96 * deviation, rel=1e-3)
+    assert 0.935 < np.mean(covered) < 0.965

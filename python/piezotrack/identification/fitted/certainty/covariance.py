@@ -34,6 +34,8 @@ __all__ = [
 
 # Correlation from which on a pair of values is named.
 CORRELATED = 0.95
+# The exponent of a Bouc-Wen stage, and the values whose unit it decides.
+EXPONENT, BY_EXPONENT = "exponent", ("beta", "gamma")
 # Share of its parts from which on a change without effect on the records moves a quantity.
 UNSEEN = 1e-3
 # Lists of a covariance with an entry for each value, as a model file has them.
@@ -243,7 +245,8 @@ class Covariance:
         Returns
         -------
         Interval
-            SI; infinite where the records do not determine the value.
+            SI; infinite where the records do not determine the value. Of a value whose unit a
+            fitted exponent decides, in the logarithm.
 
         Raises
         ------
@@ -257,7 +260,23 @@ class Covariance:
         own = math.sqrt(self.matrix[place, place])
         further = _further(normal, own, *self.by_held[place])
         ends = float(self.values[place]) + np.array([0.0, self.to_least_cost[place], further])
-        return Interval(float(ends.min()) - normal * own, float(ends.max()) + normal * own)
+        reached = Interval(float(ends.min()) - normal * own, float(ends.max()) + normal * own)
+        return self._by_factor(place, reached) if self._follows_exponent(place) else reached
+
+    def _follows_exponent(self, place: int) -> bool:
+        """Whether a value changes with a fitted exponent, which decides its unit, by factors."""
+        if EXPONENT not in self.names or self.names[place] not in BY_EXPONENT:
+            return False
+        exponent = self.names.index(EXPONENT)
+        own, other = self.matrix[place, place], self.matrix[exponent, exponent]
+        return bool(self.matrix[place, exponent] ** 2 > CORRELATED**2 * own * other)
+
+    def _by_factor(self, place: int, reached: Interval) -> Interval:
+        """Interval of a value by its logarithm."""
+        value = float(self.values[place])
+        with np.errstate(over="ignore"):
+            ends = value * np.exp(np.array(reached) / value - 1.0)
+        return Interval(float(ends.min()), float(ends.max()))
 
     def reach(self, gradient: Array, level: float = 0.95) -> float:
         """Return half of the interval of a quantity that follows from the values.
