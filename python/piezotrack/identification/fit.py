@@ -133,17 +133,17 @@ def identify(
     delay : bool, float or (float, float), optional
         Delay of the displacement with respect to the drive [s], as amplifiers and slow sensor
         readings cause it: none (False), fitted (True), known (a number), or fitted between two
-        bounds. Where it is not given: fitted where that lowers the cost by 5 %; by a swarm, and in
-        a search of several records, none. Under one slow sine the effect of a delay is that of
-        damping; a drive of several frequencies separates the two. Several records have delays of
-        their own.
+        bounds. Where it is not given: fitted where that lowers the cost by 5 %, of one record by
+        descents where by 20 %, as less may be an error of the model; by other searches none. Under
+        one slow sine the effect of a delay is that of damping; a drive of several frequencies
+        separates the two. Several records have delays of their own.
     drift : bool or float, optional
         Slow drift of the sensor along the record, ``d exp(-t/tau)``, its amplitude fitted: none
         (False), with a time constant that the record shows (True), or with this one [s]. A record
         whose drive turns fewer than six times shows none: a loop that is not closed would look the
         same. Where it is not given: for models found by least squares what the record shows, for
-        models that are searched one that lowers the cost by 20 %, as less may be an error of the
-        model. Several records have drifts of their own.
+        descents one that lowers the cost by 20 %, for a swarm none. Several records have drifts of
+        their own.
     history : {"virgin", "settled", "fit", "rest"}, optional
         What the stage went through before the record, whose first sample finds it in equilibrium:
         nothing (``"virgin"``), the drive of the record once or more until the hysteresis repeats

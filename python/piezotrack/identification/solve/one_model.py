@@ -10,6 +10,7 @@ from ..._support.display.progress_bar import ProgressBar
 from ..._support.display.progress_parts import Parts
 from ...errors import Interrupted
 from ..fitted.start import GAIN
+from ..methods.descents import Descents
 from ..methods.least_squares import LeastSquares
 from ..methods.particle_swarm import ParticleSwarm
 from .earlier_motion import earlier_motion, refined_cost
@@ -82,7 +83,7 @@ def identify_model(
             return _with_exponent(one, plain(one, begun), method, run)
 
         def with_drift(solved: Identification, search: Solve) -> tuple[Problem, Identification]:
-            if isinstance(method, LeastSquares):
+            if not isinstance(method, Descents):
                 return other, solved
             solved = with_drift_tried(other, solved, search)
             return with_drifts_of(other, solved), solved

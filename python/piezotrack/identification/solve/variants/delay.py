@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 
 __all__ = ["with_delay_tried"]
 
-# Share of the cost that a delay has to take away: creep and a lag turn the phase as it does.
-GAIN = 0.05
+# Share of the cost that a delay has to take away: creep and a lag turn the phase as it does. Of few
+# values, whose error may look like one, more.
+GAIN, GAIN_OF_FEW = 0.05, 0.2
 # A residual of so many times the noise has hardly anything but noise in it; up to so many times, a
 # delay changes its structure little, and beyond, where it takes away such a share within it.
 NOISY, NEAR, SIGN = 1.05, 1.5, 0.01
@@ -63,7 +64,7 @@ def with_delay_tried(
     Returns
     -------
     Identification
-        The one with delays where these lower the cost by 5 %.
+        The one with delays where these lower the cost by 5 %, of a search by 20 %.
     """
     fit = identify(problem, start, rest)
     given = any(record.delay is not None for record in problem.records)
@@ -71,16 +72,17 @@ def with_delay_tried(
         return fit
     records = tuple(replace(record, delay=True) for record in problem.records)
     delayed = replace(problem, records=records)
+    gain = GAIN
     try:
         if isinstance(method, LeastSquares) and method.dynamics == "auto":
             late = _by_weights(delayed, fit, start, identify)
         elif isinstance(method, Descents) and _shows_delay(delayed, fit, threads):
-            late = identify(delayed, None, voltage_of_rest(fit))
+            gain, late = GAIN_OF_FEW, identify(delayed, None, voltage_of_rest(fit))
         else:
             return fit
     except (DataError, NumericalError):
         return fit
-    return late if late.cost < (1.0 - GAIN) * fit.cost else fit
+    return late if late.cost < (1.0 - gain) * fit.cost else fit
 
 
 def _by_weights(
@@ -99,7 +101,7 @@ def _by_weights(
 
 
 def _shows_delay(delayed: Problem, fit: Identification, threads: int) -> bool:
-    """Return whether a delay lowers the cost of one record by 5 % beside the result of a search."""
+    """Return whether a delay lowers the cost of one record beside the result of a search."""
     if len(delayed.records) > 1:
         return False
     near = with_exponent_of(with_drifts_of(delayed, fit), fit)
@@ -113,4 +115,4 @@ def _shows_delay(delayed: Problem, fit: Identification, threads: int) -> bool:
     values = {name: one.value for name, one in fit.parameters.items()}
     begun = [{**values, "delay": samples * record.data.dt} for samples in BEGUN]
     costs = objective.descend([objective._place(one) for one in begun])[1]
-    return float(costs.min()) < (1.0 - GAIN) * fit.cost
+    return float(costs.min()) < (1.0 - GAIN_OF_FEW) * fit.cost
