@@ -346,6 +346,28 @@ def test_an_exponent_is_fitted_where_the_drive_jumps(jumps: str) -> None:
     assert fit.cost < 1.05 * noise
 
 
+@pytest.mark.parametrize("model", ["auto", "bouc-wen"])
+def test_a_delay_under_steps_is_found(model: str) -> None:
+    """The one that plays show is in the final fit too, and a search finds it by itself."""
+    dt, noise, late = 1e-3, 20e-9, 3
+    stage = pt.BoucWenStage(
+        mass=0.01,
+        damping=30.0,
+        stiffness=1e4,
+        piezo_coefficient=3e-7,
+        alpha=0.3,
+        beta=0.08,
+        gamma=0.02,
+    )
+    rng = np.random.default_rng(3)
+    u = np.repeat(np.concatenate([[0.0], rng.uniform(-50.0, 50.0, 24)]), 160)
+    x = np.concatenate([np.zeros(late), stage.simulate(u, dt).x[:-late]])
+    fit = pt.identify(pt.Dataset(u=u, y=x + rng.normal(0.0, noise, x.size), dt=dt), model)
+    assert fit.model.info.name == "bouc-wen"
+    assert fit.delay == pytest.approx(late * dt, abs=0.1 * dt)
+    assert fit.cost < 1.05 * noise
+
+
 def test_a_descent_begins_with_branches_that_decay_as_those_of_another_exponent() -> None:
     """The hysteresis decays per volt by beta |h|^(n - 1), with h in metres."""
     data = log()
