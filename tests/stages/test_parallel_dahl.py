@@ -183,8 +183,8 @@ def test_identification_finds_the_motion(tmp_path: Path) -> None:
     expected, found = STAGE.simulate(other, dt).x, fit.model.simulate(other, dt).x
     assert np.abs(found - expected).max() < 2e-3 * np.ptp(expected)
     # One element leaves the tips, which a drift could take a part of.
-    alone = {"delay": False, "drift": False}
-    single = pt.identify(log, "first-order-dahl", method=pt.Descents(seed=2), **alone)
+    method = pt.Descents(seed=2)
+    single = pt.identify(log, "first-order-dahl", method=method, delay=False, drift=False)
     assert single.cost > 10 * fit.cost
     assert pt.load(fit.save(tmp_path / "friction.json")).model == fit.model
     assert "sigma3/K" in fit.summary()
