@@ -19,7 +19,7 @@ from ...data.resampling import interpolated
 from ...errors import ParameterError, ShapeError
 from ...stages.delayed_reading import delayed_reading
 from ...stages.slow_loop import SlowLoop
-from .certainty.covariance import covariance_entry
+from .certainty.entries import covariance_entry
 from .drift import drift_entry
 from .fitted_record import record_entries, record_of
 from .model_entries import (

@@ -12,7 +12,7 @@ from ..._support.messages import quoted
 from ..._support.units import of_drive
 from ...errors import DataError, ParameterError, PiezotrackError
 from ...stages.registry import model_named, stage_class
-from .certainty.covariance import covariance_of_file
+from .certainty.entries import covariance_of_file
 from .drift import drift_of
 from .fitted_record import records_of_file
 from .identified_model import IdentifiedModel
