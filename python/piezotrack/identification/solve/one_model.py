@@ -18,7 +18,7 @@ from .jump import voltage_of_rest, with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
 from .variants.delay import with_delay_tried
-from .variants.drift import with_drift_tried, with_drifts_of
+from .variants.drift import drifts_of, with_drift_tried, with_drifts
 from .variants.exponent import may_have_exponent, with_exponent_tried
 from .weights import solve_least_squares
 
@@ -82,26 +82,24 @@ def identify_model(
         def with_exponent(one: Problem, begun: Structure | None = None) -> Identification:
             return _with_exponent(one, plain(one, begun), method, run)
 
-        def with_drift(solved: Identification, search: Solve) -> tuple[Problem, Identification]:
-            if not isinstance(method, Descents):
-                return other, solved
-            solved = with_drift_tried(other, solved, search)
-            return with_drifts_of(other, solved), solved
+        def with_drift(fit: Identification, search: Solve) -> Identification:
+            return with_drift_tried(other, fit, search) if isinstance(method, Descents) else fit
 
         def at_rest() -> Identification:
             fit = with_rest(other, plain, rest)
             # From the voltage of rest that the exponent 1 shows: each fit takes longer.
             shown = voltage_of_rest(fit)
-            drifting, fit = with_drift(fit, lambda one: with_rest(one, plain, shown))
-            if not may_have_exponent(drifting, fit):
+            fit = with_drift(fit, lambda one: with_rest(one, plain, shown))
+            if not may_have_exponent(other, fit):
                 return fit
+            drifting = with_drifts(other, drifts_of(fit))
             better = with_rest(drifting, with_exponent, voltage_of_rest(fit))
             return better if better.cost < (1.0 - GAIN) * fit.cost else fit
 
         if rest is not None or any(record.history == "rest" for record in other.records):
             return at_rest()
-        drifting, fit = with_drift(plain(other), plain)
-        fit = _with_exponent(drifting, fit, method, run)
+        fit = with_drift(plain(other), plain)
+        fit = _with_exponent(with_drifts(other, drifts_of(fit)), fit, method, run)
         # What is worse than another model without a jump lacks more than that.
         worse = start is not None and fit.cost > start.cost
         return fit if worse or len(other.records) > 1 else with_rest_tried(other, fit, at_rest)

@@ -20,6 +20,7 @@ from ..methods.least_squares import LeastSquares
 from .judging import is_white, judged, noise_of, period_of, two_parts
 from .jump import voltage_of_rest
 from .one_model import identify_model, weights_of
+from .variants.drift import with_drifts
 from .weights import Structure
 
 if TYPE_CHECKING:
@@ -335,11 +336,8 @@ def _as_shown(problem: Problem, start: Structure) -> Problem:
     """Return a problem with the creep, drifts and delays of a fit where none are given."""
     if problem.creep is None and start.creep_times:
         problem = replace(problem, creep=tuple(start.creep_times))
-    records = tuple(
-        replace(record, drift=True) if record.drift is None and time is not None else record
-        for record, time in zip(problem.records, start.drifts, strict=True)
-    )
-    return _with_delays(replace(problem, records=records), start)
+    drifting = with_drifts(problem, [time is not None for time in start.drifts])
+    return _with_delays(drifting, start)
 
 
 def best_of(tried: Sequence[Tried], better: float = BETTER) -> Tried:

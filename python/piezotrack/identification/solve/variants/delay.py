@@ -11,7 +11,8 @@ from ...methods.least_squares import LeastSquares
 from ...problem.objective import Objective
 from ..jump import preceded, voltage_of_rest
 from ..weights import Structure
-from .drift import with_drifts_of
+from .drift import GAIN as GAIN_OF_SEARCH
+from .drift import drifts_of, with_drifts
 from .exponent import with_exponent_of
 
 if TYPE_CHECKING:
@@ -25,9 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = ["with_delay_tried"]
 
-# Share of the cost that a delay has to take away: creep and a lag turn the phase as it does. Of few
-# values, whose error may look like one, more.
-GAIN, GAIN_OF_FEW = 0.05, 0.2
+# Share of the cost that a delay has to take away from a fit by least squares: creep and a lag turn
+# the phase as it does. From a search as much as a drift.
+GAIN = 0.05
 # A residual of so many times the noise has hardly anything but noise in it; up to so many times, a
 # delay changes its structure little, and beyond, where it takes away such a share within it.
 NOISY, NEAR, SIGN = 1.05, 1.5, 0.01
@@ -77,7 +78,7 @@ def with_delay_tried(
         if isinstance(method, LeastSquares) and method.dynamics == "auto":
             late = _by_weights(delayed, fit, start, identify)
         elif isinstance(method, Descents) and _shows_delay(delayed, fit, threads):
-            gain, late = GAIN_OF_FEW, identify(delayed, None, voltage_of_rest(fit))
+            gain, late = GAIN_OF_SEARCH, identify(delayed, None, voltage_of_rest(fit))
         else:
             return fit
     except (DataError, NumericalError):
@@ -104,7 +105,7 @@ def _shows_delay(delayed: Problem, fit: Identification, threads: int) -> bool:
     """Return whether a delay lowers the cost of one record beside the result of a search."""
     if len(delayed.records) > 1:
         return False
-    near = with_exponent_of(with_drifts_of(delayed, fit), fit)
+    near = with_exponent_of(with_drifts(delayed, drifts_of(fit)), fit)
     (record,) = near.records
     rest, start = voltage_of_rest(fit), fit.start
     if rest is not None:
@@ -115,4 +116,4 @@ def _shows_delay(delayed: Problem, fit: Identification, threads: int) -> bool:
     values = {name: one.value for name, one in fit.parameters.items()}
     begun = [{**values, "delay": samples * record.data.dt} for samples in BEGUN]
     costs = objective.descend([objective._place(one) for one in begun])[1]
-    return float(costs.min()) < (1.0 - GAIN_OF_FEW) * fit.cost
+    return float(costs.min()) < (1.0 - GAIN_OF_SEARCH) * fit.cost

@@ -12,13 +12,13 @@ from ...fitted.drift import Drift
 from ...problem.objective import Objective
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from ...fitted.identification import Identification
     from ...problem.problem import Problem
     from ...problem.records import Record
 
-__all__ = ["with_drift_tried", "with_drifts_of"]
+__all__ = ["GAIN", "drifts_of", "with_drift_tried", "with_drifts"]
 
 # Share of the cost that drifts have to take away, as an error of the model may look like one, and
 # share of the residual from which they are tried: the parameters have taken a part of them.
@@ -53,36 +53,48 @@ def with_drift_tried(
     if not any(shown):
         return fit
     try:
-        drifted = search(_drifting(problem, shown))
+        drifted = search(with_drifts(problem, shown))
     except (DataError, NumericalError):
         return fit
     return drifted if drifted.cost < (1.0 - GAIN) * fit.cost else fit
 
 
-def with_drifts_of(problem: Problem, fit: Identification) -> Problem:
-    """Let the records drift that do in a result.
+def with_drifts(problem: Problem, drifting: Iterable[bool]) -> Problem:
+    """Fit a drift of records of which nothing is given.
 
     Parameters
     ----------
     problem : Problem
         The problem.
-    fit : Identification
-        Its result.
+    drifting : iterable of bool
+        Which of its records have a drift.
 
     Returns
     -------
     Problem
-        With a drift of these, unless one is given.
+        The problem with these drifts.
     """
-    return _drifting(problem, [one.drift is not None for one in fit.records])
-
-
-def _drifting(problem: Problem, shown: list[bool]) -> Problem:
     records = tuple(
         replace(record, drift=True) if drifts and record.drift is None else record
-        for record, drifts in zip(problem.records, shown, strict=True)
+        for record, drifts in zip(problem.records, drifting, strict=True)
     )
     return replace(problem, records=records)
+
+
+def drifts_of(fit: Identification) -> list[bool]:
+    """Return which records have a drift.
+
+    Parameters
+    ----------
+    fit : Identification
+        The result.
+
+    Returns
+    -------
+    list of bool
+        One for each record.
+    """
+    return [one.drift is not None for one in fit.records]
 
 
 def _shows_drift(problem: Problem, record: Record, fit: Identification) -> bool:
