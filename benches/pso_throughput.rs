@@ -14,7 +14,7 @@ use paper::{Peak, RATE, SAMPLES, Width, candidates, drive, paper_spec};
 use piezotrack_core::identify::{
     Candidate, Evaluator, Problem, Progress, Record, Records, SwarmSettings, search,
 };
-use piezotrack_core::integrator::{Order, Stepping};
+use piezotrack_core::integrator::{Order, Stepping, Substeps};
 use piezotrack_core::models::{DahlStage, Experiment, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use pulp::Arch;
@@ -52,7 +52,10 @@ fn throughput(criterion: &mut Criterion) {
     let record = Record::new(&u, &y, 1.0 / RATE, Hold::First, 0).unwrap();
     let problem = Problem::new(&record, &paper_spec(), NEVER).unwrap();
     let evaluator = || Evaluator::new(&record, &problem, NEVER);
-    assert_eq!(evaluator().stepping, Stepping { order: Order::Second, substeps: 1 });
+    assert_eq!(
+        evaluator().stepping,
+        Stepping { order: Order::Second, substeps: Substeps::even(1) }
+    );
 
     let mut group = criterion.benchmark_group("particles and threads");
     for particles in [1, 8, 10, 64, 96] {

@@ -5,7 +5,7 @@ use piezotrack_core::identify::{
     Candidate, Delay, Evaluator, Monitor, Outcome, Problem, Progress, Record, Records, Spec,
     SwarmSettings, search,
 };
-use piezotrack_core::integrator::{Order, Stepping};
+use piezotrack_core::integrator::{Order, Stepping, Substeps};
 use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use pulp::Arch;
@@ -96,7 +96,7 @@ fn on_every_instruction_set(spec: &Spec) {
     for order in [Order::Second, Order::Fourth] {
         let evaluator = |arch| {
             let mut evaluator = Evaluator::new(&record, &problem, NEVER).on(arch);
-            evaluator.stepping = Stepping { order, substeps: 2 };
+            evaluator.stepping = Stepping { order, substeps: Substeps::even(2) };
             evaluator
         };
         let expected = bits(&evaluator(Arch::new()), &asked);
@@ -280,7 +280,7 @@ fn priors_multiply_the_cost() {
     let record = Record::new(&u, &y, DT, Hold::First, 100).unwrap();
     let problem = Problem::new(&record, &related(), NEVER).unwrap();
     let plain = Problem::new(&record, &Spec { priors: vec![], ..related() }, NEVER).unwrap();
-    let stepping = Stepping { order: Order::Fourth, substeps: 2 };
+    let stepping = Stepping { order: Order::Fourth, substeps: Substeps::even(2) };
     let costs = |problem: &Problem| {
         let mut evaluator = Evaluator::new(&record, problem, NEVER);
         evaluator.stepping = stepping;

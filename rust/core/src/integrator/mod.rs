@@ -20,7 +20,7 @@ pub use lugre_coupling::{LuGreCoupling, LuGreMemory};
 pub use nonsmooth_coupling::NonsmoothCoupling;
 pub use propagator::{Column, Mechanics, Propagator, halvings};
 pub use simulate::{Instant, LumpedStage, Motion};
-pub use stepping_loop::{FEW_TERMS, Observer, Order, Stepping, SteppingLoop, TERMS};
+pub use stepping_loop::{FEW_TERMS, Observer, Order, Stepping, SteppingLoop, Substeps, TERMS};
 pub use traits::{Coupling, FeedbackState, Kernel, MOST_PARAMETERS, Memory, Parameters};
 
 pub(crate) use accuracy::{MOST_SUBSTEPS, agrees, first_substeps, out_of_reach};

@@ -4,7 +4,7 @@ use pulp::{Simd, WithSimd};
 
 use super::accuracy::{MOST_SUBSTEPS, agrees, first_substeps, out_of_reach};
 use super::propagator::{Mechanics, halvings};
-use super::stepping_loop::{Observer, SteppingLoop};
+use super::stepping_loop::{Observer, SteppingLoop, Substeps};
 use super::traits::{FeedbackState, Kernel, Memory, Parameters};
 use crate::error::{Error, Result, positive};
 use crate::math::{dispatch_fused, room};
@@ -87,10 +87,10 @@ impl<K: Kernel> LumpedStage<K> {
         &self,
         drive: &Drive<'_>,
         start: Instant<Memory<K, f64>>,
-        substeps: usize,
+        substeps: Substeps,
         stop: Stop<'_>,
     ) -> Result<Option<Motion<Memory<K, f64>>>> {
-        if substeps == 0 {
+        if substeps.usual == 0 || substeps.at_jumps == 0 {
             return Err(Error::parameter("substeps", 0, "1 or more"));
         }
         let columns = columns(drive.u.len())?;
@@ -113,11 +113,11 @@ impl<K: Kernel> LumpedStage<K> {
         start: Instant<Memory<K, f64>>,
         stop: Stop<'_>,
     ) -> Result<Option<Motion<Memory<K, f64>>>> {
-        let substeps = first_substeps(&self.mechanics(), drive.dt);
+        let substeps = Substeps::even(first_substeps(&self.mechanics(), drive.dt));
         let Some(coarse) = self.simulate_fixed(drive, start, substeps, stop)? else {
             return Ok(None);
         };
-        let fine = self.simulate_fixed(drive, start, 2 * substeps, stop)?;
+        let fine = self.simulate_fixed(drive, start, substeps.doubled(), stop)?;
         Ok(fine.map(|mut fine| {
             fine.error_estimate = largest_difference(&coarse.x, &fine.x);
             fine
@@ -140,13 +140,16 @@ impl<K: Kernel> LumpedStage<K> {
         positive("accuracy", accuracy, "m")?;
         let limit = (MOST_STEPS / drive.u.len().max(1)).clamp(FEW_SUBSTEPS, MOST_SUBSTEPS);
         let mut substeps = first_substeps(&self.mechanics(), drive.dt).min(limit / 2);
-        let Some(mut coarse) = self.simulate_fixed(drive, start, substeps, stop)? else {
+        let Some(mut coarse) = self.simulate_fixed(drive, start, Substeps::even(substeps), stop)?
+        else {
             return Ok(None);
         };
         let mut before = f64::INFINITY;
         loop {
             substeps *= 2;
-            let Some(mut fine) = self.simulate_fixed(drive, start, substeps, stop)? else {
+            let Some(mut fine) =
+                self.simulate_fixed(drive, start, Substeps::even(substeps), stop)?
+            else {
                 return Ok(None);
             };
             fine.error_estimate = largest_difference(&coarse.x, &fine.x);
@@ -177,7 +180,7 @@ struct Run<'a, K: Kernel> {
     of: LumpedStage<K>,
     drive: &'a Drive<'a>,
     start: Instant<Memory<K, f64>>,
-    substeps: usize,
+    substeps: Substeps,
     columns: [Vec<f64>; 3],
     stop: Stop<'a>,
 }
@@ -189,15 +192,15 @@ impl<K: Kernel> WithSimd for Run<'_, K> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let Self { of, drive, start, substeps, columns: [x, v, hysteresis], stop } = self;
-        let h = drive.dt / index(substeps);
+        let h = drive.dt / index(substeps.usual);
         let halvings = halvings(of.mechanics().rate(), h);
-        let (coupling, gain) = of.kernel.coupling(&of.parameters, h, halvings);
         let mut samples = Samples { of, x, v, hysteresis, step: h, stop };
-        let stepping = SteppingLoop { coupling, gain };
+        let stepping = SteppingLoop::new(&of.kernel, &of.parameters, drive.dt, substeps, halvings);
         let from = FeedbackState { x: start.x, w: start.v * h, memory: start.memory };
-        let end = stepping.run(drive, substeps, from, &mut samples)?;
+        let end = stepping.run(drive, from, &mut samples)?;
         let last = Instant { x: end.x, v: end.w / h, memory: end.memory };
         let Samples { x, v, hysteresis, .. } = samples;
+        let substeps = substeps.usual;
         Some(Motion { x, v, hysteresis, last, substeps, error_estimate: 0.0 })
     }
 }

@@ -157,7 +157,7 @@ impl PySearch {
 
     #[getter]
     fn substeps(&self) -> usize {
-        self.found.stepping.substeps
+        self.found.stepping.substeps.usual
     }
 
     #[getter]

@@ -40,6 +40,8 @@ DECAYS = ("beta", "gamma")
 # many.
 MOST_SAMPLES, MOST_THINNED, FEWEST = 20_000, 2000, 500
 OFF, MOST_OFF = 1e-4, 1e-2
+# Change of the drive in the first interval that is a jump, in root mean squares of all changes.
+JUMP = 4.0
 # Share of a parameter within which the last search stays, and by how much its cost may be above
 # that of the profile.
 NEAR, WORSE = 0.5, 0.02
@@ -124,7 +126,7 @@ def _is_free(problem: Problem) -> bool:
 def _thinned(data: Dataset) -> Dataset:
     """Keep every so many of the samples, as straight lines between them allow."""
     u = data.full.u
-    if data.hold != "foh":
+    if data.hold != "foh" or _jumps_first(u):
         return data
     every = len(u) // FEWEST
     while every > 1 and _off(u, every) > OFF:
@@ -141,12 +143,15 @@ def _thinned(data: Dataset) -> Dataset:
     return thin[float(thin.t[-(-data.warmup // every)]) :]
 
 
-def _off(u: Array, every: int) -> float:
-    """Return how far a drive is from straight lines between every so many of its samples.
+def _jumps_first(u: Array) -> bool:
+    """Return whether a drive jumps in the first interval, after which a mode may ring."""
+    changes = np.diff(u)
+    return bool(abs(changes[0]) > JUMP * np.sqrt(np.mean(changes**2)))
 
-    It may jump in the first interval.
-    """
-    places = np.arange(every, u.size - every)
+
+def _off(u: Array, every: int) -> float:
+    """Return how far a drive is from straight lines between every so many of its samples."""
+    places = np.arange(u.size - every)
     between = np.interp(places, np.arange(0, u.size, every), u[::every])
     return float(np.abs(between - u[places]).max()) / float(np.ptp(u))
 

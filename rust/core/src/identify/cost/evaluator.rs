@@ -58,7 +58,7 @@ impl<'a> Evaluator<'a> {
         let window = &record.y[record.window.clone()];
         let centre =
             if problem.offset { window.iter().sum::<f64>() / index(window.len()) } else { 0.0 };
-        let halvings = halvings(rate, record.drive.dt / index(stepping.substeps));
+        let halvings = halvings(rate, record.drive.dt / index(stepping.substeps.usual));
         let (held, arch) = (problem.held(), Arch::new());
         let creep_times = &problem.creep_times;
         let (offset, drifts) = (problem.offset, problem.has_drift());
@@ -252,41 +252,26 @@ impl<K: Kernel, const V: usize> WithSimd for Bundle<'_, K, V> {
         for (i, parameter) in parameters.iter_mut().enumerate() {
             *parameter = place(i);
         }
-        let step = drive.dt / index(substeps);
-        let (coupling, gain) = kernel.coupling(&parameters, step, of.halvings);
         let (x, memory) =
             of.visited.iter().fold((zero, kernel.rest(&parameters)), |from, &volts| {
                 let volts = if volts.is_nan() { place(BEFORE) } else { Number::like(zero, volts) };
                 kernel.approach(&parameters, from, volts)
             });
         let start = FeedbackState { x, w: zero, memory };
-        let stepping = SteppingLoop { coupling, gain };
+        let stepping = SteppingLoop::new(&kernel, &parameters, drive.dt, substeps, of.halvings);
+        let usual = index(substeps.usual);
         let residuals = &of.residuals;
         if const { V > 1 } {
-            let mut sums = ResidualSums::new(
-                residuals,
-                candidates,
-                stride,
-                stop,
-                zero,
-                index(substeps),
-                || Direct,
-            );
-            let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
+            let mut sums =
+                ResidualSums::new(residuals, candidates, stride, stop, zero, usual, || Direct);
+            let ended = stepping.run(drive, start, &mut sums).is_some();
             sums.conclude(ended)
         } else {
-            let delayed = || Delayed::new(candidates, drive.dt, x, index(substeps));
+            let delayed = || Delayed::new(candidates, drive.dt, x, usual);
             let reading = || of.problem.has_delay().then(delayed);
-            let mut sums = ResidualSums::new(
-                residuals,
-                candidates,
-                stride,
-                stop,
-                zero,
-                index(substeps),
-                reading,
-            );
-            let ended = stepping.run(drive, substeps, start, &mut sums).is_some();
+            let mut sums =
+                ResidualSums::new(residuals, candidates, stride, stop, zero, usual, reading);
+            let ended = stepping.run(drive, start, &mut sums).is_some();
             sums.conclude(ended)
         }
     }

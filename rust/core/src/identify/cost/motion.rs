@@ -2,7 +2,7 @@
 
 use crate::identify::parameters::candidate::Theta;
 use crate::identify::records::history::{History, voltages_before};
-use crate::integrator::{Kernel, LumpedStage, Parameters, Stepping};
+use crate::integrator::{Kernel, LumpedStage, Parameters, Stepping, Substeps};
 use crate::models::{Held, KernelVisitor, Model};
 use crate::signal::{Drive, Stop};
 
@@ -27,7 +27,7 @@ struct One<'a> {
     parameters: Parameters<f64>,
     voltages: Vec<f64>,
     drive: &'a Drive<'a>,
-    substeps: usize,
+    substeps: Substeps,
     stop: Stop<'a>,
 }
 

@@ -90,7 +90,7 @@ impl<'a> Records<'a> {
     pub(in crate::identify) fn finer(&self) -> Records<'a> {
         let finer = |one: &Member<'a>| {
             let Stepping { order, substeps } = one.evaluator.stepping;
-            let stepping = Stepping { order, substeps: 2 * substeps };
+            let stepping = Stepping { order, substeps: substeps.doubled() };
             Evaluator::stepped(one.evaluator.record(), one.evaluator.problem(), stepping)
         };
         Records::new(self.members.iter().map(finer).collect())

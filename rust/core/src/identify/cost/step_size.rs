@@ -7,9 +7,9 @@ use crate::identify::parameters::candidate::{DELAY, Theta};
 use crate::identify::problem::Problem;
 use crate::identify::records::history::History;
 use crate::identify::records::record::Record;
-use crate::integrator::{Mechanics, Order, Stepping, first_substeps, steps_for};
+use crate::integrator::{Mechanics, Order, Stepping, Substeps, first_substeps, steps_for};
 use crate::models::Model;
-use crate::signal::{Drive, Stop, range};
+use crate::signal::{Drive, Stop, index, range};
 
 /// Accuracy that a search asks of its simulations, m.
 const ACCURACY: f64 = 2e-10;
@@ -22,6 +22,9 @@ const MOST: usize = 256;
 
 /// Steps of second order that cost what one of fourth order does.
 const WORTH: usize = 2;
+
+/// Change of the drive over an interval beyond which it jumps, in root mean squares of all changes.
+const JUMP: f64 = 4.0;
 
 /// The cheapest stepping with which the stages at the corners of the box and in its middle are
 /// accurate to 0.2 nm, or to two millionths of the stroke.
@@ -38,55 +41,87 @@ pub(in crate::identify) fn choose(
     let stroke = 2.0 * record.stroke();
     let accuracy = ACCURACY.max(SHARE * record.stroke());
     let thetas = representatives(problem);
-    let trials: Vec<(&Theta, Drive<'_>, usize)> = thetas
+    let jump = jump(&record.drive);
+    let trials: Vec<(Trial<'_>, Substeps)> = thetas
         .par_iter()
-        .flat_map_iter(|theta| excerpts.iter().map(move |drive| (theta, *drive)))
+        .flat_map_iter(|theta| excerpts.iter().map(move |drive| (theta, drive)))
         .filter_map(|(theta, drive)| {
-            let trial = Trial { model: problem.model, theta, drive: &drive, accuracy, stop };
-            let (steps, x) = trial.steps(Order::Fourth, MOST)?;
+            let trial = Trial { model: problem.model, theta, drive, jump, accuracy, stop };
+            let (substeps, x) = trial.steps(Order::Fourth, MOST)?;
             let (low, high) = range(&x);
-            (high - low <= stroke).then_some((theta, drive, steps))
+            (high - low <= stroke).then_some((trial, substeps))
         })
         .collect();
-    let fourth = trials.iter().map(|trial| trial.2).max().unwrap_or(1);
-    if !problem.model.has_second_order(&problem.held()) {
-        return Stepping { order: Order::Fourth, substeps: fourth };
+    let fourth = most(trials.iter().map(|trial| trial.1));
+    if problem.model.has_second_order(&problem.held()) {
+        let second: Option<Vec<Substeps>> = trials
+            .par_iter()
+            .map(|(trial, _)| Some(trial.steps(Order::Second, WORTH * fourth.at_jumps)?.0))
+            .collect();
+        let second = second.map(|steps| most(steps.into_iter()));
+        let worth = second.filter(|steps| {
+            steps.usual <= WORTH * fourth.usual && steps.at_jumps <= WORTH * fourth.at_jumps
+        });
+        if let Some(substeps) = worth {
+            return Stepping { order: Order::Second, substeps };
+        }
     }
-    let most = WORTH * fourth;
-    let second: Option<Vec<usize>> = trials
-        .par_iter()
-        .map(|&(theta, ref drive, _)| {
-            let trial = Trial { model: problem.model, theta, drive, accuracy, stop };
-            let found = trial.steps(Order::Second, most)?;
-            (found.0 <= most).then_some(found.0)
-        })
-        .collect();
-    match second.map(|steps| steps.into_iter().max().unwrap_or(1)) {
-        Some(substeps) => Stepping { order: Order::Second, substeps },
-        None => Stepping { order: Order::Fourth, substeps: fourth },
-    }
+    Stepping { order: Order::Fourth, substeps: fourth }
+}
+
+/// Change of a drive over an interval beyond which it jumps, V; infinite where it never does.
+fn jump(drive: &Drive<'_>) -> f64 {
+    let changes = || (1..drive.u.len()).map(|k| drive.interval(k - 1).1.abs());
+    let mean = changes().map(|change| change * change).sum::<f64>() / index(drive.u.len());
+    let jump = JUMP * mean.sqrt();
+    if changes().any(|change| change > jump) { jump } else { f64::INFINITY }
+}
+
+/// The steps with which all that need some of these are accurate; one where none does.
+fn most(all: impl Iterator<Item = Substeps>) -> Substeps {
+    all.fold(Substeps::even(1), |most, one| Substeps {
+        usual: most.usual.max(one.usual),
+        at_jumps: most.at_jumps.max(one.at_jumps),
+        jump: most.jump.min(one.jump),
+    })
 }
 
 /// A candidate on a part of the drive.
+#[derive(Clone, Copy)]
 struct Trial<'a> {
     model: Model,
     theta: &'a Theta,
     drive: &'a Drive<'a>,
+    /// Change of the whole drive beyond which it jumps, V.
+    jump: f64,
     accuracy: f64,
     stop: Stop<'a>,
 }
 
 impl Trial<'_> {
     /// The sub-steps that make it accurate, and the displacement with them.
-    fn steps(&self, order: Order, most: usize) -> Option<(usize, Vec<f64>)> {
-        let &Self { model, theta, drive, accuracy, stop } = self;
+    fn steps(&self, order: Order, most: usize) -> Option<(Substeps, Vec<f64>)> {
+        let &Self { model, theta, drive, jump, accuracy, stop } = self;
         let [mass, damping, stiffness, ..] = theta.parameters();
         let first = first_substeps(&Mechanics { mass, damping, stiffness }, drive.dt);
-        steps_for(first, accuracy, most, |substeps| {
-            let [x, _] =
-                motion(model, History::Virgin, theta, drive, Stepping { order, substeps }, stop)?;
+        let run = |substeps| {
+            let stepping = Stepping { order, substeps };
+            let [x, _] = motion(model, History::Virgin, theta, drive, stepping, stop)?;
             Some(x)
-        })
+        };
+        // Those of the few intervals with a jump first: they may need far more than all others.
+        let jumping = |usual, at_jumps| Substeps { usual, at_jumps, jump };
+        let at_jumps = if jump.is_finite() {
+            steps_for(first, accuracy, most, |count| run(jumping(first, count)))?.0
+        } else {
+            first
+        };
+        let several = |usual| match usual < at_jumps {
+            true => jumping(usual, at_jumps),
+            false => Substeps::even(usual),
+        };
+        let (usual, x) = steps_for(first, accuracy, most, |usual| run(several(usual)))?;
+        Some((several(usual), x))
     }
 }
 
@@ -119,7 +154,7 @@ pub(in crate::identify) fn corners(problem: &Problem) -> Vec<Theta> {
 
 /// Parts of a long drive that ask most of the integrator: its beginning, and its steepest part.
 fn excerpts<'a>(drive: &Drive<'a>) -> Vec<Drive<'a>> {
-    const LENGTH: usize = 8192;
+    const LENGTH: usize = 2048;
     if drive.u.len() <= 2 * LENGTH {
         return vec![*drive];
     }
