@@ -728,7 +728,10 @@ class Dataset(Viewed):
         return changed
 
     def _preceded(self, u: float) -> Dataset:
-        """Put a sample with a drive of `u` before all others; its displacement does not count."""
+        """Put a sample at which the drive is held at `u` before all others.
+
+        The drive jumps at the sample that was the first; the displacement of the new one does not count.
+        """
         longer = Dataset(
             u=np.concatenate(([u], self._u)),
             y=np.concatenate((self._y[:1], self._y)),
@@ -737,6 +740,7 @@ class Dataset(Viewed):
             drive_unit=self._drive_unit,
             source=self._source,
         )
+        longer._hold = "jump" if self._hold == "foh" else self._hold
         for name in ("_left_out", "_inserted"):
             if (mask := getattr(self, name)) is not None:
                 setattr(longer, name, np.concatenate(([True], mask)))

@@ -66,7 +66,7 @@ class Start:
         What the stage went through before the record: nothing, the drive of the record, a voltage
         that was fitted, or rest at a voltage until the drive jumped to its first sample.
     state : StageState
-        State at the first sample: in equilibrium, but after such a jump.
+        State at the first sample, in equilibrium; before such a jump.
     voltage : float or None
         The voltage that was fitted, or at which the stage was at rest [V].
     record : str
@@ -275,7 +275,7 @@ def start_after(
 
 
 def start_at_jump(model: Stage, data: Dataset, voltage: float = 0.0) -> Start:
-    """State at the first sample of a record to which the drive jumped within an interval.
+    """State at the first sample of a record, at which the drive jumps.
 
     Parameters
     ----------
@@ -289,11 +289,9 @@ def start_at_jump(model: Stage, data: Dataset, voltage: float = 0.0) -> Start:
     Returns
     -------
     Start
-        The start, not in equilibrium.
+        The start, in equilibrium at that voltage.
     """
-    drive = [voltage, float(data.full.u[0])]
-    rest = model.equilibrium(voltage)
-    state = model.simulate(drive, data.dt, hold=data.hold, initial=rest).final
+    state = model.equilibrium(voltage)
     return Start(history="rest", state=state, voltage=voltage, record=fingerprint(data))
 
 

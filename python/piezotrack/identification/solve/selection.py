@@ -52,16 +52,16 @@ LEAST_SQUARES = (
 )
 SEARCHED = ("first-order-dahl", "parallel-dahl", "bouc-wen")
 # Of these, one of few values predicts other motions where plays describe only the record: tried
-# unless those leave nothing but noise.
-FEW_VALUES = "bouc-wen"
+# where those leave more than so many times the noise.
+FEW_VALUES, MORE_THAN_NOISE = "bouc-wen", 1.02
 # Models that contain another one, whose search costs less: tried where it is near the best.
 CONTAINED = {"parallel-dahl": "first-order-dahl"}
 NEAR_BEST = 1.5
 OF_FORCE = ("bouc-wen-oscillator", "prandtl-ishlinskii")
-# A residual of so many times the noise has nothing but noise in it: no further model is tried or
-# searched, and a fit to whole records is not made anew. One of so many times, on what was not
-# fitted, is good enough to search none.
-HARDLY_MORE, NOTHING_BUT_NOISE, NEAR_NOISE = 1.05, 1.2, 2.0
+# A residual of so many times the noise has nothing but noise in it: no further model of many
+# weights is tried, and a fit to whole records is not made anew. One of so many times, on what was
+# not fitted, is good enough to search none.
+NOTHING_BUT_NOISE, NEAR_NOISE = 1.2, 2.0
 # Another model has to be better by this share than one before it in the list; where the record
 # has one loop, on which all are judged that were fitted to it, by more.
 BETTER, BETTER_ON_ONE_LOOP = 0.03, 0.1
@@ -78,7 +78,8 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
 
     Models whose weights follow by least squares come first, and all of them, unless one leaves
     nothing but noise; those after the first begin with its history, creep, drift and dynamics.
-    Models that are searched are tried where none of these comes near the noise.
+    Models that are searched are tried where none of these comes near the noise, Bouc-Wen wherever
+    they leave more than noise.
 
     Parameters
     ----------
@@ -110,16 +111,17 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     infos = models_tried(problem.records[0].data, problem.parameters)
     # About how long each takes; the best is fitted once more at the end.
     shares = Parts([*(SLOWER if info.searched else 1.0 for info in infos), 1.0])
+    enough = False
     with trials.side_by_side([info for info in infos if not info.searched]):
         for i, info in enumerate(infos):
+            if enough and info.name != FEW_VALUES:
+                continue
             if info.searched and not trials.worth_searching(info.name):
                 continue
             if not trials.near_best(CONTAINED.get(info.name)):
                 continue
             with shares.begin(i):
-                enough = trials.run(info)
-            if enough:
-                break
+                enough = trials.run(info) or enough
     if not trials.found:
         raise trials.refused or DataError("no model could be fitted")
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
@@ -136,13 +138,13 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
         fit = whole(best, best.start)
         noise = max(noise_of(record.data) for record in problem.records)
         one = trials.of_few_values(best, fit)
-        if one is not None and fit.cost > HARDLY_MORE * min(fit.noises):
+        if one is not None and fit.cost > MORE_THAN_NOISE * min(fit.noises):
             # Few values that describe the whole record as well as many weights do predict more.
             with suppress(DataError, NumericalError):
                 of_model = _as_shown(problem, Structure.of(fit)).of_model(one.info)
                 rest = voltage_of_rest(fit)
                 other = identify_model(of_model, methods.method(one.info), run, rest=rest)
-                if other.cost < (1.0 - BETTER) * fit.cost:
+                if other.cost < fit.cost:
                     best, fit = one, other
         if best.info.name == MANY_WEIGHTS or fit.cost > NOTHING_BUT_NOISE * noise:
             # The first part does not show all that the whole record does.
@@ -213,8 +215,9 @@ class _Trials:
 
     def worth_searching(self, name: str) -> bool:
         """Return whether a model that is searched may be better than what was found so far."""
-        near = self.least < NEAR_NOISE or self.fitted < NOTHING_BUT_NOISE
-        return self.least > NOTHING_BUT_NOISE and (name == FEW_VALUES or not near)
+        if name == FEW_VALUES:
+            return self.least > MORE_THAN_NOISE
+        return self.least >= NEAR_NOISE and self.fitted >= NOTHING_BUT_NOISE
 
     def whole(self, problem: Problem, info: ModelInfo) -> Problem:
         """Return the problem of a model on the whole records, with the delays that were shown."""
@@ -233,7 +236,7 @@ class _Trials:
 
         It is near the best one, or was judged with a drift in what was not fitted.
         """
-        if best.start is None or self.least <= NOTHING_BUT_NOISE:
+        if best.start is None or self.least <= MORE_THAN_NOISE:
             return None
         pairs = zip(whole.records, best.start.drifts, strict=True)
         drifts = any(record.drift and not before for record, before in pairs)

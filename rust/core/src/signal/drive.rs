@@ -15,6 +15,17 @@ pub enum Hold {
     First,
     /// Zero order: each value is held until the next.
     Zero,
+    /// First order, but the first value is held until the second, at which the drive jumps.
+    Jump,
+}
+
+impl Hold {
+    /// Course of the drive over the interval that ends at sample `k`.
+    #[inline(always)]
+    #[must_use]
+    pub fn until(self, k: usize) -> Self {
+        if self == Self::Jump && k != 1 { Self::First } else { self }
+    }
 }
 
 /// A drive voltage, sampled evenly.
@@ -52,8 +63,8 @@ impl<'a> Drive<'a> {
     #[inline(always)]
     #[must_use]
     pub fn interval(&self, k: usize) -> (f64, f64) {
-        let change = if self.hold == Hold::First { self.u[k + 1] - self.u[k] } else { 0.0 };
-        (self.u[k], change)
+        let straight = self.hold.until(k + 1) == Hold::First;
+        (self.u[k], if straight { self.u[k + 1] - self.u[k] } else { 0.0 })
     }
 }
 

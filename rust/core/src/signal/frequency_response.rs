@@ -55,7 +55,7 @@ impl Spectrum {
         let half = angle / 2.0;
         let spread = if half == 0.0 { 1.0 } else { libm::sin(half) / half };
         match self.hold {
-            Hold::First => plain / (spread * spread),
+            Hold::First | Hold::Jump => plain / (spread * spread),
             Hold::Zero => plain / spread,
         }
     }

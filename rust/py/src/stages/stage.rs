@@ -26,6 +26,7 @@ pub fn hold(name: &str) -> Result<Hold> {
     match name {
         "foh" => Ok(Hold::First),
         "zoh" => Ok(Hold::Zero),
+        "jump" => Ok(Hold::Jump),
         other => Err(Error::parameter("hold", format!("'{other}'"), "'foh' or 'zoh'")),
     }
 }

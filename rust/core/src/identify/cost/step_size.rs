@@ -116,9 +116,8 @@ impl Trial<'_> {
         } else {
             first
         };
-        let several = |usual| match usual < at_jumps {
-            true => jumping(usual, at_jumps),
-            false => Substeps::even(usual),
+        let several = |usual| {
+            if usual < at_jumps { jumping(usual, at_jumps) } else { Substeps::even(usual) }
         };
         let (usual, x) = steps_for(first, accuracy, most, |usual| run(several(usual)))?;
         Some((several(usual), x))

@@ -87,7 +87,7 @@ impl<'a> WeightsRecord<'a> {
 
     /// Seconds within which the drive comes to a sample: none where it is held and jumps.
     pub(super) fn step(&self, k: usize) -> f64 {
-        if k > 0 && self.drive.hold == Hold::First { self.drive.dt } else { f64::INFINITY }
+        if k > 0 && self.drive.hold.until(k) == Hold::First { self.drive.dt } else { f64::INFINITY }
     }
 
     /// Whether the drive jumps from one sample to the next.

@@ -64,7 +64,7 @@ pub fn voltages_before(drive: &Drive<'_>, history: History, from: f64) -> Vec<f6
             let latest = &turning[turning.len().saturating_sub(MOST_TURNS)..];
             let mut round = vec![low, high];
             round.extend(latest.iter().map(|&k| drive.u[k]));
-            if drive.hold == Hold::First {
+            if drive.hold != Hold::Zero {
                 round.extend(drive.u.last());
             }
             let mut all = round.repeat(ROUNDS);

@@ -165,7 +165,9 @@ impl Steps {
             probe(0.0, 0.0, 0.0, 1.0),
         ];
         Some(match drive.hold {
-            Hold::First => Self { x: columns.map(|one| one.0), v: columns.map(|one| one.1) },
+            Hold::First | Hold::Jump => {
+                Self { x: columns.map(|one| one.0), v: columns.map(|one| one.1) }
+            }
             Hold::Zero => {
                 let held = probe(0.0, 0.0, 1.0, 1.0);
                 let of = |each: fn((f64, f64)) -> f64| {

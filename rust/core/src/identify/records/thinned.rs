@@ -34,7 +34,9 @@ impl Thinned {
 
     /// Its drive, of a record with this one.
     pub fn drive(&self, of: &Drive<'_>) -> Drive<'_> {
-        Drive { u: &self.u, dt: of.dt * index(self.every), hold: of.hold }
+        // The first interval that is left has more than the jump in it.
+        let hold = if self.every > 1 { of.hold.until(0) } else { of.hold };
+        Drive { u: &self.u, dt: of.dt * index(self.every), hold }
     }
 
     /// A sample of the record in the thinned one, or the next one that is there.

@@ -363,7 +363,7 @@ impl<O: Segmented> InputStage<O> {
                 steps = 0;
             }
             steps += 1;
-            match drive.hold {
+            match drive.hold.until(k) {
                 Hold::First if k == 0 => self.jump(&mut state, volts, zero),
                 Hold::First => {
                     longest = longest.max((volts - drive.u[k - 1]).abs());
@@ -374,6 +374,11 @@ impl<O: Segmented> InputStage<O> {
                     self.jump(&mut state, drive.u[k - 1], zero);
                     let held = state.relaxation.input;
                     self.relaxation.step(&flow.relaxation, &mut state.relaxation, held);
+                }
+                Hold::Jump => {
+                    let held = state.relaxation.input;
+                    self.relaxation.step(&flow.relaxation, &mut state.relaxation, held);
+                    self.jump(&mut state, volts, zero);
                 }
             }
             if !state.relaxation.x.is_finite() {

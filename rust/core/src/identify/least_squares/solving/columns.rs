@@ -165,14 +165,16 @@ impl<'f, 'a> Columns<'f, 'a> {
                 *moved = follower.state.x;
             }
         }
-        let gaps: Vec<usize> = (first..first + count).map(|at| self.strides.gap(at)).collect();
-        self.follow_stage(&gaps);
+        let steps: Vec<(usize, Hold)> =
+            (first..first + count).map(|at| (self.strides.gap(at), self.hold.until(at))).collect();
+        self.follow_stage(&steps);
         let mut step = usize::from(first == 0);
-        for alike in gaps[step..].chunk_by(|a, b| a == b) {
+        for alike in steps[step..].chunk_by(|a, b| a == b) {
+            let (gap, hold) = alike[0];
             dispatch_fused(Bundles {
                 part: &self.parts.whole,
-                gap: alike[0],
-                hold: self.hold,
+                gap,
+                hold,
                 followers: &mut self.followers,
                 inputs: &self.inputs,
                 moved: &mut self.moved,
@@ -189,14 +191,14 @@ impl<'f, 'a> Columns<'f, 'a> {
     }
 
     /// Follow the columns of the stage's own input and creep over so many intervals each.
-    fn follow_stage(&mut self, gaps: &[usize]) {
+    fn follow_stage(&mut self, steps: &[(usize, Hold)]) {
         let Parts { whole, bare, nudged, decay } = &self.parts;
         let mut stage = self.followers[self.inner];
         self.stage.clear();
-        for (i, &gap) in gaps.iter().enumerate() {
+        for (i, &(gap, hold)) in steps.iter().enumerate() {
             let input = self.inputs[i * self.width + self.inner];
             if self.at + i > 0 {
-                stage.next(&whole.part, whole.over(gap), self.hold, input);
+                stage.next(&whole.part, whole.over(gap), hold, input);
                 // These move from sample to sample whatever the hold.
                 for (column, q) in self.reached.iter_mut().zip(stage.state.creep) {
                     bare.part.step(bare.over(gap), &mut column.state, q);
@@ -207,7 +209,7 @@ impl<'f, 'a> Columns<'f, 'a> {
                     bare.part.step(bare.over(gap), &mut column.state, *left);
                 }
                 for (column, one) in self.nudged.iter_mut().zip(nudged) {
-                    column.next(&one.part, one.over(gap), self.hold, input);
+                    column.next(&one.part, one.over(gap), hold, input);
                 }
             }
             self.stage.push(stage.state);
@@ -261,6 +263,10 @@ impl WithSimd for Bundles<'_> {
                     Hold::Zero => {
                         part.jump(&mut state, before);
                         part.step(flow, &mut state, before);
+                    }
+                    Hold::Jump => {
+                        part.step(flow, &mut state, before);
+                        part.jump(&mut state, input);
                     }
                 }
                 before = input;

@@ -38,6 +38,10 @@ impl Follower {
                 part.jump(&mut self.state, self.before);
                 part.step(flow, &mut self.state, self.before);
             }
+            Hold::Jump => {
+                part.step(flow, &mut self.state, self.before);
+                part.jump(&mut self.state, input);
+            }
         }
         self.before = input;
         self.state.x

@@ -116,7 +116,7 @@ impl<'a> Fit<'a> {
             take(&mut inputs, k);
             let flow = creep.over(strides.gap(place));
             for (follower, input) in followers.iter_mut().zip(&inputs) {
-                follower.next(&creep.part, flow, drive.hold, *input);
+                follower.next(&creep.part, flow, drive.hold.until(k), *input);
             }
         }
         let length = drive.dt * index(drive.u.len() - 1);
@@ -161,7 +161,7 @@ impl<'a> Fit<'a> {
             let x = match &mut follower {
                 Some(follower) => {
                     let flow = whole.over(strides.gap(place));
-                    follower.next(&whole.part, flow, drive.hold, output)
+                    follower.next(&whole.part, flow, drive.hold.until(k), output)
                 }
                 none => none.insert(Follower::at_rest(&whole.part, output, &creep[0])).state.x,
             };

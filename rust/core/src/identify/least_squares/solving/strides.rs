@@ -15,7 +15,7 @@ impl Strides {
     pub fn of(fit: &Fit<'_>, r: usize, end: usize) -> Self {
         let record = &fit.common.records[r];
         let u = record.drive.u;
-        if fit.every[r] == 1 || fit.exact || record.drive.hold == Hold::First {
+        if fit.every[r] == 1 || fit.exact || record.drive.hold != Hold::Zero {
             return Self((0..end).collect());
         }
         // Also in the warm-up and where readings are left out, or a step would be of any length.
