@@ -6,7 +6,7 @@ use piezotrack_core::identify::{
     SwarmSettings, search,
 };
 use piezotrack_core::integrator::{Order, Stepping, Substeps};
-use piezotrack_core::models::{DahlStage, Experiment, Model, StageModel};
+use piezotrack_core::models::{BoucWenStage, DahlStage, Experiment, Model, StageModel};
 use piezotrack_core::signal::{Drive, Hold, NEVER};
 use pulp::Arch;
 
@@ -272,6 +272,29 @@ fn abandoning_a_guess_changes_no_result() {
     for spec in [spec(), creeping(), related()] {
         abandoning(&spec);
     }
+}
+
+/// The accuracy that a search asks for, with few steps where the drive does not jump.
+#[test]
+fn a_jump_of_the_drive_asks_for_steps_of_its_own_interval_only() {
+    let u: Vec<f64> = (0..1500)
+        .map(|k| if k == 0 { -40.0 } else { 20.0 + 35.0 * (0.01 * f64::from(k)).cos() })
+        .collect();
+    let stage = BoucWenStage::xu_li_2010_corrected();
+    let drive = Drive::new(&u, DT, Hold::First).unwrap();
+    let y = stage.simulate(&Experiment::of(&drive, NEVER)).unwrap().unwrap().x;
+    let record = Record::new(&u, &y, DT, Hold::First, 2).unwrap();
+    let spec = Spec { fixed: vec![("exponent".into(), 1.7)], ..Spec::of(Model::BoucWen) };
+    let problem = Problem::new(&record, &spec, NEVER).unwrap();
+    let evaluator = Evaluator::new(&record, &problem, NEVER);
+    let Substeps { usual, at_jumps, .. } = evaluator.stepping.substeps;
+    assert!(at_jumps >= 4 * usual, "{usual}, {at_jumps}");
+    let mut fine = Evaluator::new(&record, &problem, NEVER);
+    fine.stepping.substeps = Substeps::even(2 * at_jumps);
+    let middle = vec![0.5; problem.free().count()];
+    let candidates = [Candidate::of(problem.theta(&middle))];
+    let [few, many] = [&evaluator, &fine].map(|one| one.costs(&candidates, NEVER)[0].rms);
+    assert!((few - many).abs() < 4e-10, "{few} m, {many} m");
 }
 
 #[test]

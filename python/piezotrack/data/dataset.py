@@ -727,10 +727,10 @@ class Dataset(Viewed):
         changed._zero = self._zero
         return changed
 
-    def _preceded(self, u: float) -> Dataset:
-        """Put a sample at which the drive is held at `u` before all others.
+    def _preceded(self, u: float, within: bool) -> Dataset:
+        """Put a sample with a drive of `u` before all others; its displacement does not count.
 
-        The drive jumps at the sample that was the first; the displacement of the new one does not count.
+        The drive jumps at the sample that was the first, or within the interval before.
         """
         longer = Dataset(
             u=np.concatenate(([u], self._u)),
@@ -740,7 +740,8 @@ class Dataset(Viewed):
             drive_unit=self._drive_unit,
             source=self._source,
         )
-        longer._hold = "jump" if self._hold == "foh" else self._hold
+        if self._hold == "foh" and not within:
+            longer._hold = "jump"  # type: ignore[assignment]
         for name in ("_left_out", "_inserted"):
             if (mask := getattr(self, name)) is not None:
                 setattr(longer, name, np.concatenate(([True], mask)))

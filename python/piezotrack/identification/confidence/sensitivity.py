@@ -272,8 +272,8 @@ class LinearisedRecord:
     def _begun(self, model: IdentifiedModel, voltage: float | None = None) -> StageState:
         """State at the first sample of a model beside the one that was fitted."""
         start, stage = self.start, model.model
-        if start.history == "rest":
-            return start_at_jump(stage, self.data, start.voltage or 0.0).state
+        if start.rest is not None:
+            return start_at_jump(stage, self.data, start.rest).state
         volts = start.voltage if voltage is None else voltage
         if start.history == "fit" and volts is None:
             return start.state

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import asdict, dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "History",
+    "Rest",
     "Start",
     "begin",
     "checked_history",
@@ -56,6 +57,21 @@ KNOWN_BY, COMPARED = 16, 20_000
 GRID, SECTIONS = 17, 10
 
 
+class Rest(NamedTuple):
+    """Rest of a stage until the drive jumped to the first sample of a record.
+
+    Attributes
+    ----------
+    voltage : float
+        Voltage at which it was at rest [V].
+    within : bool
+        Whether the drive jumped within the interval before that sample, and not at it.
+    """
+
+    voltage: float
+    within: bool = False
+
+
 @dataclass(frozen=True, kw_only=True)
 class Start:
     """State of a stage at the first sample of a record, and what it is due to.
@@ -66,17 +82,28 @@ class Start:
         What the stage went through before the record: nothing, the drive of the record, a voltage
         that was fitted, or rest at a voltage until the drive jumped to its first sample.
     state : StageState
-        State at the first sample, in equilibrium; before such a jump.
+        State at the first sample: in equilibrium, where the drive jumps there before the jump, and
+        after one within the interval before.
     voltage : float or None
         The voltage that was fitted, or at which the stage was at rest [V].
     record : str
         Fingerprint of the beginning of the record.
+    within : bool
+        Whether such a jump was within the interval before the first sample, and not at it.
     """
 
     history: History
     state: StageState
     voltage: float | None
     record: str
+    within: bool = False
+
+    @property
+    def rest(self) -> Rest | None:
+        """Rest before the drive jumped to the first sample, if it did."""
+        if self.history != "rest":
+            return None
+        return Rest(0.0 if self.voltage is None else self.voltage, self.within)
 
 
 def checked_history(history: object) -> History | None:
@@ -126,6 +153,7 @@ def start_entry(start: Start | None, unit: str) -> dict[str, Any] | None:
         "voltage": {"value": start.voltage, "unit": unit},
         "state": state_entry(start.state),
         "record": start.record,
+        **({"jumped_within_interval": True} if start.within else {}),
     }
 
 
@@ -201,6 +229,7 @@ def start_of(entry: Any, state: type[StageState]) -> Start | None:
         state=begun,
         voltage=None if volts is None else _core.as_number("start: voltage", volts),
         record=text_of("start: record", start["record"]) or "",
+        within=start.get("jumped_within_interval") is True,
     )
 
 
@@ -274,25 +303,34 @@ def start_after(
     return Start(history=history, state=state, voltage=voltage, record=fingerprint(data))
 
 
-def start_at_jump(model: Stage, data: Dataset, voltage: float = 0.0) -> Start:
-    """State at the first sample of a record, at which the drive jumps.
+def start_at_jump(model: Stage, data: Dataset, rest: Rest) -> Start:
+    """State at the first sample of a record to which the drive jumps.
 
     Parameters
     ----------
     model : Stage
-        The stage, at rest before.
+        The stage.
     data : Dataset
         The record.
-    voltage : float, optional
-        Voltage at which it was at rest [V].
+    rest : Rest
+        Its rest before.
 
     Returns
     -------
     Start
-        The start, in equilibrium at that voltage.
+        The start.
     """
-    state = model.equilibrium(voltage)
-    return Start(history="rest", state=state, voltage=voltage, record=fingerprint(data))
+    state = model.equilibrium(rest.voltage)
+    if rest.within:
+        drive = [rest.voltage, float(data.full.u[0])]
+        state = model.simulate(drive, data.dt, hold=data.hold, initial=state).final
+    return Start(
+        history="rest",
+        state=state,
+        voltage=rest.voltage,
+        record=fingerprint(data),
+        within=rest.within,
+    )
 
 
 def _repeating(model: Any, data: Dataset, state: Any) -> StageState:
@@ -355,7 +393,7 @@ def begin(
         The start; without more freedom than the record needs.
     """
     if history == "rest":
-        return start_at_jump(model, data)
+        return start_at_jump(model, data, Rest(0.0))
     search = _Search(model, _beginning(data), residual, offset, reached or (math.inf, -math.inf))
     if history == "fit":
         return replace(search.fitted(), record=fingerprint(data))

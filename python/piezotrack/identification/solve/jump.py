@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from ... import _core
 from ...errors import ParameterError
 from ..fitted.model_entries import origin_of, provenance
 from ..fitted.notes import carried_by_first_samples
-from ..fitted.start import GAIN, least_voltage, start_at_jump
+from ..fitted.start import GAIN, Rest, least_voltage, start_at_jump
 from ..methods.least_squares import LeastSquares
 from .weights import Structure
 
@@ -27,15 +28,16 @@ if TYPE_CHECKING:
 
     Identify = Callable[[Problem, Structure | None], Identification]
 
-__all__ = ["preceded", "voltage_of_rest", "with_rest", "with_rest_tried"]
+__all__ = ["preceded", "rest_of", "with_rest", "with_rest_tried"]
 
 # Voltages of rest with a fit each, spread and about the best of these.
 COARSE, ABOUT = 9, 6
 # Samples of the beginning of a record on which they are compared: so many, or twice those up to
 # where the drive has reversed by such a share of its range.
 FIRST, REVERSED = 1500, 0.1
-# Ratio of residuals of the beginning that are alike, how many of their voltages are tried on the
-# whole record, and ratio of its residual to that of the beginning that ends this.
+# Ratio of residuals of the beginning that are alike, how many of these are tried on the whole
+# record, and ratio of its residual to that of the beginning, or of that and the noise, that ends
+# this.
 ALIKE, TRIED, APART = 1.1, 3, 1.5
 # Fits with a voltage of rest that was found from the one before, at most.
 ROUNDS = 3
@@ -76,16 +78,16 @@ def with_rest_tried(
     return jumped if explains else fit
 
 
-def voltage_of_rest(fit: Identification) -> float | None:
-    """Return the voltage [V] at which a stage was at rest until the drive jumped, if it was."""
-    start = fit.start
-    return start.voltage if start is not None and start.history == "rest" else None
+def rest_of(fit: Identification) -> Rest | None:
+    """Return the rest of a stage until the drive jumped, if it was at rest."""
+    return None if fit.start is None else fit.start.rest
 
 
-def with_rest(problem: Problem, identify: Identify, known: float | None = None) -> Identification:
+def with_rest(problem: Problem, identify: Identify, known: Rest | None = None) -> Identification:
     """Identify a stage that was at rest until the drive jumped to the first sample.
 
-    At rest at a voltage, or at another one where that lowers the residual by 2 %.
+    At rest at a voltage, or at another one where that lowers the residual by 2 %. The drive jumps
+    at the first sample, or within the interval before, whichever explains more.
 
     Parameters
     ----------
@@ -93,9 +95,9 @@ def with_rest(problem: Problem, identify: Identify, known: float | None = None) 
         The problem, of one record.
     identify : callable
         What solves a problem, from a structure if one is given.
-    known : float, optional
-        Voltage of rest [V] that another fit has shown, about which it is searched; 0 V, and a
-        grid where that is far off, without.
+    known : Rest, optional
+        Rest that another fit has shown, about whose voltage it is searched; 0 V, and a grid where
+        that is far off, without.
 
     Returns
     -------
@@ -111,29 +113,45 @@ def with_rest(problem: Problem, identify: Identify, known: float | None = None) 
     if len(problem.records) > 1:
         raise ParameterError("history", "'rest'", "another one of several records")
     data = problem.records[0].data
-    fit = _at_rest(problem, identify, 0.0 if known is None else known)
-    if known is None and _begins_apart(fit, fit.data):
+    kinds = (False,) if data.hold == "zoh" else (False, True)
+    if known is not None:
+        return _nearer(problem, identify, _at_rest(problem, identify, known))
+    fit = _at_rest(problem, identify, Rest(0.0))
+    for within in kinds[1:]:
+        if _begins_apart(fit, fit.data):
+            other = _at_rest(problem, identify, Rest(0.0, within))
+            fit = min(fit, other, key=lambda one: one.cost)
+    if _begins_apart(fit, fit.data):
         begun = _begun(problem)
         start = Structure.of(fit) if isinstance(fit.method, LeastSquares) else None
-        costs: dict[float, float] = {}
+        costs: dict[Rest, float] = {}
 
-        def cost(volts: float) -> float:
-            costs[volts] = _at_rest(begun, identify, volts, start).cost
-            return costs[volts]
+        def cost(within: bool, volts: float) -> float:
+            rest = Rest(volts, within)
+            costs[rest] = _at_rest(begun, identify, rest, start).cost
+            return costs[rest]
 
-        least = costs[least_voltage(cost, _voltages(data), (COARSE, ABOUT))]
-        # The beginning may explain several voltages alike, of which the whole record shows one.
-        alike = [
-            volts for volts in sorted(costs, key=costs.__getitem__) if costs[volts] < ALIKE * least
-        ]
+        for within in kinds:
+            of_kind = partial(cost, within)
+            least_voltage(of_kind, _voltages(data), (COARSE, ABOUT))
+            least = min(costs.values())
+            if least < APART * fit.noises[0]:
+                break
+        # The beginning may explain several alike, of which the whole record shows one.
+        alike = [one for one in sorted(costs, key=costs.__getitem__) if costs[one] < ALIKE * least]
         best = fit
-        for volts in alike[:TRIED]:
-            best = min(best, _at_rest(problem, identify, volts), key=lambda one: one.cost)
+        for rest in alike[:TRIED]:
+            best = min(best, _at_rest(problem, identify, rest), key=lambda one: one.cost)
             if best.cost < APART * least:
                 break
         fit = best if best.cost < (1.0 - GAIN) * fit.cost else fit
+    return _nearer(problem, identify, fit)
+
+
+def _nearer(problem: Problem, identify: Identify, fit: Identification) -> Identification:
+    """Move the voltage of rest to where a fit explains the record best."""
     for _ in range(ROUNDS):
-        better = best_voltage(fit, data)
+        better = best_rest(fit, problem.records[0].data)
         if better is None:
             break
         other = _at_rest(problem, identify, better)
@@ -143,42 +161,44 @@ def with_rest(problem: Problem, identify: Identify, known: float | None = None) 
     return fit
 
 
-def best_voltage(fit: Identification, data: Dataset) -> float | None:
-    """Return the voltage of rest with which a model explains a record best.
+def best_rest(fit: Identification, data: Dataset) -> Rest | None:
+    """Return the rest, of any voltage, with which a model explains a record best.
 
     Parameters
     ----------
     fit : Identification
-        The model, and the voltage of rest that it was fitted with.
+        The model, and the rest that it was fitted with.
     data : Dataset
         The record.
 
     Returns
     -------
-    float or None
-        The voltage [V]; None where none lowers the residual by 2 %.
+    Rest or None
+        The rest; None where none lowers the residual by 2 %.
     """
+    known = rest_of(fit) or Rest(0.0)
 
     def cost(volts: float, data: Dataset = data) -> float:
-        start = start_at_jump(fit.model, data, volts)
+        start = start_at_jump(fit.model, data, known._replace(voltage=volts))
         own = replace(fit.records[0], start=start)
         left = _left(replace(fit, start=start, records=(own,)), data)[1:]
         return float(np.std(left) if fit.offset_fitted else np.sqrt(np.mean(left**2)))
 
     first = _first(data)
     volts = least_voltage(lambda volts: cost(volts, first), _voltages(data))
-    return volts if cost(volts) < (1.0 - GAIN) * cost(voltage_of_rest(fit) or 0.0) else None
+    better = cost(volts) < (1.0 - GAIN) * cost(known.voltage)
+    return known._replace(voltage=volts) if better else None
 
 
-def preceded(problem: Problem, volts: float) -> Problem:
+def preceded(problem: Problem, rest: Rest) -> Problem:
     """Put a stage at rest before the drive jumps to the first sample.
 
     Parameters
     ----------
     problem : Problem
         The problem, of one record.
-    volts : float
-        Voltage of rest [V].
+    rest : Rest
+        The rest.
 
     Returns
     -------
@@ -186,7 +206,7 @@ def preceded(problem: Problem, volts: float) -> Problem:
         With a record that begins at rest, whose window begins after the jump.
     """
     (record,) = problem.records
-    before = record.data._preceded(volts)
+    before = record.data._preceded(*rest)
     begin = before.t[0] if record.data.warmup else before.full.t[2]
     at_rest = replace(record, data=before[float(begin) :], history="virgin")
     return replace(problem, records=(at_rest,))
@@ -229,12 +249,12 @@ def _first(data: Dataset) -> Dataset:
 
 
 def _at_rest(
-    problem: Problem, identify: Identify, volts: float, start: Structure | None = None
+    problem: Problem, identify: Identify, rest: Rest, start: Structure | None = None
 ) -> Identification:
     data = problem.records[0].data
-    fit = identify(preceded(problem, volts), start)
+    fit = identify(preceded(problem, rest), start)
     judged = data if data.warmup else data[float(data.t[1]) :]
-    at_jump = start_at_jump(fit.model, data, volts)
+    at_jump = start_at_jump(fit.model, data, rest)
     own = replace(fit.records[0], data=judged, start=at_jump, origin=origin_of(judged))
     known = {**fit.details, "provenance": {**fit.details["provenance"], **provenance(judged)}}
     return replace(fit, data=judged, records=(own,), start=at_jump, details=known)

@@ -14,7 +14,7 @@ from ..methods.descents import Descents
 from ..methods.least_squares import LeastSquares
 from ..methods.particle_swarm import ParticleSwarm
 from .earlier_motion import earlier_motion, refined_cost
-from .jump import voltage_of_rest, with_rest, with_rest_tried
+from .jump import rest_of, with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
 from .variants.delay import with_delay_tried
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from ..fitted.identification import Identification
-    from ..fitted.start import History
+    from ..fitted.start import History, Rest
     from ..methods.choice import Method, Search
     from ..problem.problem import Problem
     from .run import Run
@@ -46,7 +46,7 @@ def identify_model(
     method: Method,
     run: Run,
     start: Structure | None = None,
-    rest: float | None = None,
+    rest: Rest | None = None,
 ) -> Identification:
     """Identify one model, by its method.
 
@@ -60,9 +60,8 @@ def identify_model(
         How it is run.
     start : Structure, optional
         Structure that least squares begin with.
-    rest : float, optional
-        Voltage [V] at which another model has shown the stage at rest, until the drive jumped to
-        the first sample.
+    rest : Rest, optional
+        Rest of the stage, until the drive jumped to the first sample, that another model has shown.
 
     Returns
     -------
@@ -75,7 +74,7 @@ def identify_model(
         As for `identify`.
     """
 
-    def identify(other: Problem, start: Structure | None, rest: float | None) -> Identification:
+    def identify(other: Problem, start: Structure | None, rest: Rest | None) -> Identification:
         def plain(one: Problem, begun: Structure | None = None) -> Identification:
             return _identify(one, method, run, begun or start)
 
@@ -88,12 +87,12 @@ def identify_model(
         def at_rest() -> Identification:
             fit = with_rest(other, plain, rest)
             # From the voltage of rest that the exponent 1 shows: each fit takes longer.
-            shown = voltage_of_rest(fit)
+            shown = rest_of(fit)
             fit = with_drift(fit, lambda one: with_rest(one, plain, shown))
             if not may_have_exponent(other, fit):
                 return fit
             drifting = with_drifts(other, drifts_of(fit))
-            better = with_rest(drifting, with_exponent, voltage_of_rest(fit))
+            better = with_rest(drifting, with_exponent, rest_of(fit))
             return better if better.cost < (1.0 - GAIN) * fit.cost else fit
 
         if rest is not None or any(record.history == "rest" for record in other.records):

@@ -18,7 +18,7 @@ from ...stages.registry import model_named
 from ..fitted.selection import Selection, Trial
 from ..methods.least_squares import LeastSquares
 from .judging import is_white, judged, noise_of, period_of, two_parts
-from .jump import voltage_of_rest
+from .jump import rest_of
 from .one_model import identify_model, weights_of
 from .variants.drift import with_drifts
 from .weights import Structure
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from ...data.dataset import Dataset
     from ...stages.model_info import ModelInfo
     from ..fitted.identification import Identification
+    from ..fitted.start import Rest
     from ..methods.choice import MethodChoice
     from ..problem.problem import Problem
     from .run import Run
@@ -142,7 +143,7 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
             # Few values that describe the whole record as well as many weights do predict more.
             with suppress(DataError, NumericalError):
                 of_model = _as_shown(problem, Structure.of(fit)).of_model(one.info)
-                rest = voltage_of_rest(fit)
+                rest = rest_of(fit)
                 other = identify_model(of_model, methods.method(one.info), run, rest=rest)
                 if other.cost < fit.cost:
                     best, fit = one, other
@@ -170,9 +171,9 @@ class Tried:
     info: ModelInfo
     # Whether its inverse is ill-conditioned.
     ill: bool
-    # Its structure, where least squares have found it, and the voltage of rest before a jump.
+    # Its structure, where least squares have found it, and its rest before a jump.
     start: Structure | None
-    rest: float | None = None
+    rest: Rest | None = None
 
 
 class _Attempt(NamedTuple):
@@ -198,10 +199,9 @@ class _Trials:
     # Least residual so far, in multiples of the noise, on what was not fitted and on what was.
     least: float = math.inf
     fitted: float = math.inf
-    # Structure of the first fit by least squares, and the voltage of rest from which the drive
-    # jumped.
+    # Structure of the first fit by least squares, and its rest before a jump.
     start: Structure | None = None
-    rest: float | None = None
+    rest: Rest | None = None
     # Models found by least squares, and those of them that are fitted in threads.
     by_weights: list[ModelInfo] = field(default_factory=list)
     pool: ThreadPoolExecutor | None = None
@@ -286,7 +286,7 @@ class _Trials:
             # The first model decides whether others have a delay and, where it is near the noise,
             # whether they begin with a jump: one that is not may take for a jump what it lacks.
             if fit.cost < NEAR_NOISE * min(fit.noises):
-                self.rest = voltage_of_rest(fit)
+                self.rest = rest_of(fit)
         records = self.problem.records
         counts = np.array(
             [one.weight * len(rest) for one, rest in zip(records, self.rests, strict=True)]
@@ -295,7 +295,7 @@ class _Trials:
         squares = np.array([judged(rest, one) for rest, one in pairs])
         rms = math.sqrt(float(counts @ squares) / float(counts.sum()))
         trial = Trial(info.name, info.title, rms, attempt.seconds)
-        self.found.append(Tried(trial, info, attempt.ill, start, voltage_of_rest(fit)))
+        self.found.append(Tried(trial, info, attempt.ill, start, rest_of(fit)))
         self.fitted = min(self.fitted, fit.cost / max(min(fit.noises), 1e-300))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
         noise = np.array([noise_of(rest.measured) for rest in self.rests])

@@ -365,9 +365,9 @@ def _start(model: IdentifiedModel, data: Dataset, still: Array) -> Start:
     start = begin(
         stage, data, None, residual, offset=True, enough=enough, reached=model.drive_range
     )
-    if known is None or known.history != "rest":
+    if known is None or known.rest is None:
         return start
-    jump = start_at_jump(stage, data, known.voltage or 0.0)
+    jump = start_at_jump(stage, data, known.rest)
     both = [float(np.std(data.counted(residual(data, one.state)))) for one in (start, jump)]
     return jump if both[1] < both[0] else start
 

@@ -145,8 +145,8 @@ class Motion:
     def _after_history(self, stage: Any) -> Array:
         """Displacement of a stage that went through what the stage did before the record [m]."""
         start, data = self.start, self.data
-        if start.history == "rest":
-            begun = start_at_jump(stage, data, start.voltage or 0.0)
+        if start.rest is not None:
+            begun = start_at_jump(stage, data, start.rest)
         else:
             begun = start_after(stage, data, start.history, start.voltage)
         return self.read(stage, begun.state)

@@ -12,7 +12,7 @@ from ....data.checks.fast_drive import is_fast
 from ....errors import DataError, ParameterError, PiezotrackError
 from ...fitted.certainty.confidence import LowerMinimum
 from ...fitted.estimates import Estimate
-from ...fitted.start import start_after, start_at_jump
+from ...fitted.start import Rest, start_after, start_at_jump
 from ...problem.parameter import Parameter
 from ...problem.problem import Problem
 from ...problem.records import Record
@@ -184,8 +184,8 @@ def _begun(model: IdentifiedModel, record: FittedRecord) -> FittedRecord:
     start, data, stage = record.start, record.data, model.model
     if start is None or data is None:
         return record
-    if start.history == "rest":
-        return replace(record, start=start_at_jump(stage, data, start.voltage or 0.0))
+    if start.rest is not None:
+        return replace(record, start=start_at_jump(stage, data, start.rest))
     begun = start_after(stage, data, start.history, start.voltage, creeps=False)
     return replace(record, start=begun)
 
@@ -242,6 +242,6 @@ def _record(fit: Identification, own: FittedRecord) -> Record:
 
 def _preceded(data: Dataset, own: FittedRecord) -> Dataset:
     """Return a record with the rest before its first sample."""
-    volts = own.start.voltage if own.start and own.start.voltage is not None else 0.0
-    before = data._preceded(volts)
+    rest = own.start.rest if own.start else None
+    before = data._preceded(*(rest or Rest(0.0)))
     return before[float(before.t[0]) :]

@@ -6,10 +6,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ....errors import DataError, NumericalError
+from ...fitted.start import Rest
 from ...methods.descents import Descents
 from ...methods.least_squares import LeastSquares
 from ...problem.objective import Objective
-from ..jump import preceded, voltage_of_rest
+from ..jump import preceded, rest_of
 from ..weights import Structure
 from .drift import GAIN as GAIN_OF_SEARCH
 from .drift import drifts_of, with_drifts
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from ...methods.choice import Method
     from ...problem.problem import Problem
 
-    Identify = Callable[[Problem, Structure | None, float | None], Identification]
+    Identify = Callable[[Problem, Structure | None, Rest | None], Identification]
 
 __all__ = ["with_delay_tried"]
 
@@ -40,7 +41,7 @@ def with_delay_tried(
     problem: Problem,
     method: Method,
     start: Structure | None,
-    rest: float | None,
+    rest: Rest | None,
     identify: Identify,
     threads: int,
 ) -> Identification:
@@ -55,8 +56,8 @@ def with_delay_tried(
         and by descents for one record where those beside the result show one.
     start : Structure, optional
         Structure that least squares begin with.
-    rest : float or None
-        Voltage of rest [V] that another model has shown.
+    rest : Rest or None
+        Rest that another model has shown.
     identify : callable
         What solves a problem from a structure, and from a voltage of rest.
     threads : int
@@ -78,7 +79,7 @@ def with_delay_tried(
         if isinstance(method, LeastSquares) and method.dynamics == "auto":
             late = _by_weights(delayed, fit, start, identify)
         elif isinstance(method, Descents) and _shows_delay(delayed, fit, threads):
-            gain, late = GAIN_OF_SEARCH, identify(delayed, None, voltage_of_rest(fit))
+            gain, late = GAIN_OF_SEARCH, identify(delayed, None, rest_of(fit))
         else:
             return fit
     except (DataError, NumericalError):
@@ -90,14 +91,14 @@ def _by_weights(
     delayed: Problem, fit: Identification, start: Structure | None, identify: Identify
 ) -> Identification:
     """Fit delays from the structure of a fit, and anew where they change it."""
-    rest, near = voltage_of_rest(fit), NEAR * min(fit.noises)
+    rest, near = rest_of(fit), NEAR * min(fit.noises)
     late = identify(delayed, Structure.of(fit, kept=start is not None and start.kept), rest)
     share = GAIN if fit.cost < near else SIGN
     if start is None and late.cost < (1.0 - share) * fit.cost:
         late = min(late, identify(delayed, None, rest), key=lambda one: one.cost)
     if start is None and rest is not None and late.cost > near:
         # Another voltage of rest may stand for the delay.
-        late = min(late, identify(delayed, None, 0.0), key=lambda one: one.cost)
+        late = min(late, identify(delayed, None, Rest(0.0)), key=lambda one: one.cost)
     return late
 
 
@@ -107,7 +108,7 @@ def _shows_delay(delayed: Problem, fit: Identification, threads: int) -> bool:
         return False
     near = with_exponent_of(with_drifts(delayed, drifts_of(fit)), fit)
     (record,) = near.records
-    rest, start = voltage_of_rest(fit), fit.start
+    rest, start = rest_of(fit), fit.start
     if rest is not None:
         near = preceded(near, rest)
     elif start is not None:

@@ -56,7 +56,9 @@ fn steady(of: &mut Measures, record: &Record<'_>, mode: f64) {
     let (low, high) = range(u);
     let (least, most) = range(&u_means);
     let slow = most - least > SLOW_PART * (high - low);
-    let Ok(drive) = Drive::new(&u_means, record.drive.dt, record.drive.hold.until(0)) else { return };
+    let Ok(drive) = Drive::new(&u_means, record.drive.dt, record.drive.hold.until(0)) else {
+        return;
+    };
     if slow && u_means.len() > 3 {
         let found = Measures::of(&drive, &y_means, 0..u_means.len());
         if found.gain > 0.0 && found.gain < of.gain {
