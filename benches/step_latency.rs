@@ -11,10 +11,13 @@ use piezotrack_control::{
     IntegralResonantControl, IterativeLearning, LeadLag, Limits, Pid, PositivePositionFeedback,
     PositiveVelocityPositionFeedback, Repetitive, ScheduledPid, SlidingMode, Smoothing, StateSpace,
 };
-use piezotrack_core::integrator::{FEW_TERMS, TERMS};
+use piezotrack_core::integrator::{FEW_TERMS, Substeps, TERMS};
 use piezotrack_core::models::DahlStage;
 use piezotrack_core::models::dahl::SmoothKernel;
 use piezotrack_core::signal::{Drive, Hold, NEVER};
+
+/// One step in each sampling interval.
+const EACH: Substeps = Substeps::even(1);
 
 fn latency(criterion: &mut Criterion) {
     let turn = core::f64::consts::TAU * 0.25 / 5000.0;
@@ -25,11 +28,11 @@ fn latency(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(5000));
     let second = stage.lumped(SmoothKernel::<FEW_TERMS, false>);
     group.bench_function("one lane, Second order", |bencher| {
-        bencher.iter(|| black_box(&second).simulate_fixed(&drive, second.rest(), 1, NEVER));
+        bencher.iter(|| black_box(&second).simulate_fixed(&drive, second.rest(), EACH, NEVER));
     });
     let fourth = stage.lumped(SmoothKernel::<TERMS, true>);
     group.bench_function("one lane, Fourth order", |bencher| {
-        bencher.iter(|| black_box(&fourth).simulate_fixed(&drive, fourth.rest(), 1, NEVER));
+        bencher.iter(|| black_box(&fourth).simulate_fixed(&drive, fourth.rest(), EACH, NEVER));
     });
     group.finish();
 }

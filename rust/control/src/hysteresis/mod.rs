@@ -29,7 +29,7 @@ pub use play::{Play, PlayBranch, PlayState};
 use crate::Number;
 
 /// A hysteresis operator: configuration in `&self`, memory in `State`.
-pub trait Operator<N: Number> {
+pub trait Operator<N: Number>: Copy {
     /// State of the operator, which depends on the path.
     type State: Copy;
     /// A monotone section of the path that leaves a state in one direction.

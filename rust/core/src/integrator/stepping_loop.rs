@@ -106,8 +106,12 @@ impl<N: Number, C: Coupling<N>> SteppingLoop<N, C> {
         substeps: Substeps,
         halvings: u32,
     ) -> Self {
-        let coupling = |count| kernel.coupling(parameters, dt / index(count), halvings);
-        let [(usual, gain), (at_jumps, _)] = [substeps.usual, substeps.at_jumps].map(coupling);
+        // Written out: a closure would not be compiled for the vectors of its caller.
+        let (usual, gain) = kernel.coupling(parameters, dt / index(substeps.usual), halvings);
+        let mut at_jumps = usual;
+        if substeps.at_jumps != substeps.usual {
+            at_jumps = kernel.coupling(parameters, dt / index(substeps.at_jumps), halvings).0;
+        }
         Self { couplings: [usual, at_jumps], gain, substeps }
     }
 
@@ -127,14 +131,15 @@ impl<N: Number, C: Coupling<N>> SteppingLoop<N, C> {
         let mut from = 1;
         while from < drive.u.len() {
             let jumps = self.substeps.jumps_to(drive, from);
-            let (coupling, count) =
-                if jumps { (&self.couplings[1], at_jumps) } else { (&self.couplings[0], usual) };
+            // By value: what is chosen by reference stays in memory.
+            let [usually, at_jump] = self.couplings;
+            let (coupling, count) = if jumps { (at_jump, at_jumps) } else { (usually, usual) };
             let block = from + (BLOCK / count).max(1);
             let to = self.substeps.alike(drive, from, block.min(drive.u.len()));
             let reached = if const { C::SHORT } && count == 1 && usual == 1 {
-                self.whole(coupling, drive, from..to, state, observer)
+                self.whole(&coupling, drive, from..to, state, observer)
             } else {
-                self.parts(coupling, drive, count, from..to, state, observer)
+                self.parts(&coupling, drive, count, from..to, state, observer)
             };
             state = reached;
             if observer.give_up(to - 1) {
@@ -177,7 +182,7 @@ impl<N: Number, C: Coupling<N>> SteppingLoop<N, C> {
     ) -> FeedbackState<N, C::Memory> {
         let part = 1.0 / index(count);
         let scale = index(self.substeps.usual) * part;
-        let [down, up] = [scale, 1.0 / scale].map(|by| self.gain.like(by));
+        let (down, up) = (self.gain.like(scale), self.gain.like(1.0 / scale));
         for k in samples {
             let (u, change) = drive.interval(k - 1);
             let change = change * part;

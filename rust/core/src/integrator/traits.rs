@@ -16,7 +16,7 @@ pub struct FeedbackState<N, M> {
 }
 
 /// A hysteresis coupled with linear mechanics, as one step in time sees it.
-pub trait Coupling<N> {
+pub trait Coupling<N>: Copy {
     /// Whether a step is so short that a loop around it shows.
     const SHORT: bool = false;
 
