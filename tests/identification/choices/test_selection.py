@@ -66,12 +66,12 @@ def tried(fit: pt.identification.Identification) -> list[str]:
     return [trial.model for trial in selection_of(fit).trials]
 
 
-def test_plays_are_found_without_a_search() -> None:
+def test_plays_that_leave_noise_end_the_trials_of_other_weights() -> None:
     fit = pt.identify(record(PLAYS, 1e-8), progress=False)
     assert fit.model.info.name == "prandtl-ishlinskii"
     assert fit.cost < 3e-8
-    # As good as the noise: no other kind could be better.
-    assert tried(fit) == ["prandtl-ishlinskii"]
+    # Few values might explain as much.
+    assert set(tried(fit)) <= {"prandtl-ishlinskii", "bouc-wen"}
     assert selection_of(fit).fitted_until is not None
     until = selection_of(fit).fitted_until
     assert f"{until:.4g} s, by their rms after it:" in fit.summary()
