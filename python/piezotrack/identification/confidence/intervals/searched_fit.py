@@ -12,7 +12,7 @@ from ....data.checks.fast_drive import is_fast
 from ....errors import DataError, ParameterError, PiezotrackError
 from ...fitted.certainty.confidence import LowerMinimum
 from ...fitted.estimates import Estimate
-from ...fitted.start import Rest, start_after, start_at_jump
+from ...fitted.start import start_after, start_at_jump
 from ...problem.parameter import Parameter
 from ...problem.problem import Problem
 from ...problem.records import Record
@@ -23,7 +23,6 @@ from .local_weights import LocalWeights
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ....data.dataset import Dataset
     from ...fitted.certainty.covariance import Covariance
     from ...fitted.fitted_record import FittedRecord
     from ...fitted.identification import Identification
@@ -224,8 +223,10 @@ def _record(fit: Identification, own: FittedRecord) -> Record:
     data, history = own.data, own.start.history if own.start else "virgin"
     if data is None:
         raise ParameterError("model", "no record", "what pt.identify returns", verb="has")
-    if history == "rest":
-        data, history = _preceded(data, own), "virgin"
+    rest = own.start.rest if own.start else None
+    if rest is not None:
+        before = data._preceded(*rest)
+        data, history = before[float(before.t[0]) :], "virgin"
     elif fit.interpolation and data.inserted is None and is_fast(data):
         data = data.interpolate(fit.interpolation)
     delay = own.parameters.get(DELAY)
@@ -238,10 +239,3 @@ def _record(fit: Identification, own: FittedRecord) -> Record:
         history=history,
         weight=own.weight,
     )
-
-
-def _preceded(data: Dataset, own: FittedRecord) -> Dataset:
-    """Return a record with the rest before its first sample."""
-    rest = own.start.rest if own.start else None
-    before = data._preceded(*(rest or Rest(0.0)))
-    return before[float(before.t[0]) :]
