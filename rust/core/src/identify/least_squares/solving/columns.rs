@@ -7,7 +7,7 @@ use core::ops::Range;
 use pulp::{Simd, WithSimd};
 
 use super::fit::Fit;
-use super::follower::Follower;
+use super::follower::{Follower, follow};
 use super::record_path::Walk;
 use super::strides::{Stepped, Strides};
 use crate::error::Result;
@@ -258,17 +258,7 @@ impl WithSimd for Bundles<'_> {
                 let from = k * width + b * lanes;
                 let inputs = &self.inputs[from..from + lanes];
                 let input = Lanes::<S, VECTORS>::gather(simd, |i| inputs[i]);
-                match self.hold {
-                    Hold::First => part.step(flow, &mut state, input),
-                    Hold::Zero => {
-                        part.jump(&mut state, before);
-                        part.step(flow, &mut state, before);
-                    }
-                    Hold::Jump => {
-                        part.step(flow, &mut state, before);
-                        part.jump(&mut state, input);
-                    }
-                }
+                follow(part, flow, self.hold, &mut state, [before, input]);
                 before = input;
                 self.moved[from..from + lanes].copy_from_slice(state.x.as_slice());
             }

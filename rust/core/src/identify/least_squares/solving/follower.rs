@@ -1,5 +1,7 @@
 //! Creep and dynamics behind one signal of a record.
 
+use piezotrack_control::Number;
+
 use crate::models::{Relaxation, RelaxationFlow, RelaxationState};
 use crate::signal::Hold;
 
@@ -32,18 +34,30 @@ impl Follower {
         hold: Hold,
         input: f64,
     ) -> f64 {
-        match hold {
-            Hold::First => part.step(flow, &mut self.state, input),
-            Hold::Zero => {
-                part.jump(&mut self.state, self.before);
-                part.step(flow, &mut self.state, self.before);
-            }
-            Hold::Jump => {
-                part.step(flow, &mut self.state, self.before);
-                part.jump(&mut self.state, input);
-            }
-        }
+        follow(part, flow, hold, &mut self.state, [self.before, input]);
         self.before = input;
         self.state.x
+    }
+}
+
+/// Moves a state from the sample where the first input comes in to the one of the second.
+#[inline(always)]
+pub(super) fn follow<N: Number>(
+    part: &Relaxation,
+    flow: &RelaxationFlow,
+    hold: Hold,
+    state: &mut RelaxationState<N>,
+    [before, input]: [N; 2],
+) {
+    match hold {
+        Hold::First => part.step(flow, state, input),
+        Hold::Zero => {
+            part.jump(state, before);
+            part.step(flow, state, before);
+        }
+        Hold::Jump => {
+            part.step(flow, state, before);
+            part.jump(state, input);
+        }
     }
 }
