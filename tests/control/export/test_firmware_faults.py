@@ -107,6 +107,7 @@ def test_samples_that_do_not_come_are_a_fault(tmp_path: Path) -> None:
     with Clock(one) as clock, booted(one, tmp_path, "host", clock.address) as (address, _):
         device = connected(address)
         device.hold(30.0)
+        assert within(lambda: clock.volts[-1] > 29.0)
         clock.going = False
         assert within(lambda: device.state().fault == "sampling")
         clock.going = True
