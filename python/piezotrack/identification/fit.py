@@ -139,11 +139,11 @@ def identify(
         separates the two. Several records have delays of their own.
     drift : bool or float, optional
         Slow drift of the sensor along the record, ``d exp(-t/tau)``, its amplitude fitted: none
-        (False), with a time constant that the record shows (True), or with this one [s]. A record
-        whose drive turns fewer than six times shows none: a loop that is not closed would look the
-        same. Where it is not given: for models found by least squares what the record shows, for
-        descents one that lowers the cost by 20 %, for a swarm none. Several records have drifts of
-        their own.
+        (False), with a time constant that the record shows (True), or with this one [s]. Where it
+        is not given: for models found by least squares what the record shows, for descents one
+        that lowers the cost by 20 %, for a swarm none. Where the drive turns fewer than six times,
+        a loop that is not closed looks the same: least squares then fit none, and descents without
+        a value only one that leaves nothing but noise. Several records have drifts of their own.
     history : {"virgin", "settled", "fit", "rest"}, optional
         What the stage went through before the record, whose first sample finds it in equilibrium:
         nothing (``"virgin"``), the drive of the record once or more until the hysteresis repeats

@@ -36,7 +36,7 @@ def ratio(choices: Any, seed: int) -> float:
     return float(default / min(default, *(choices.cost(data, named) for named in choices.NAMED)))
 
 
-@pytest.mark.parametrize("seed", [2, 18, 35, 44, 45])
+@pytest.mark.parametrize("seed", [2, 18, 27, 35, 47])
 def test_no_choice_named_is_better_than_the_default(seed: int) -> None:
     assert ratio(bench(), seed) < 1.03
 
@@ -66,16 +66,18 @@ def cases(monkeypatch: pytest.MonkeyPatch) -> Any:
         pytest.param(1, 19, id="mode"),
         pytest.param(1, 24, id="history"),
         pytest.param(3, 11, id="relays"),
+        pytest.param(10, 14, id="late mode"),
     ],
 )
 def test_another_motion_of_a_foreign_stage_is_predicted(cases: Any, seed: int, number: int) -> None:
     # A mode of 345 Hz at 500 Hz, which hides the shape of the plays; a chirp from rest, which a
-    # fitted history would explain better; relays that switch once and never back.
+    # fitted history would explain better; relays that switch once and never back; a mode that the
+    # first part of a chirp does not reach.
     case = cases.make(seed, number)
     fit = pt.identify(pt.Dataset(u=case.u, y=case.y, dt=case.dt))
     assert fit.cost < 2.0 * case.noise
     other = fit.score(pt.Dataset(u=case.other_u, y=case.other_y, dt=case.dt))
-    # 0.6 % each before, with residuals of 11, 1.3 and 7 times the noise.
+    # Before 0.6 % each, with residuals of 11, 1.3 and 7 times the noise; of the last 1.3 % with 7.
     assert other.rms < 0.002 * case.stroke
 
 

@@ -84,6 +84,38 @@ def test_a_searched_model_finds_a_drift_that_is_not_given() -> None:
     assert with_drift(record(), drift=None).drift is None
 
 
+def of_few_turns(drift: float) -> pt.Dataset:
+    """Levels up and down and up of a Bouc-Wen stage, with a drift that fades in the record."""
+    stage = pt.BoucWenStage(
+        mass=2.8e-3,
+        damping=20.0,
+        stiffness=1e6,
+        piezo_coefficient=1.6e-7,
+        alpha=0.25,
+        beta=0.03,
+        gamma=0.01,
+    )
+    u = np.repeat(np.r_[0.0:75.0:15.0, 75.0:-60.0:-15.0, -60.0:60.0:20.0], 200)
+    t = np.arange(u.size) / 1000.0
+    noise = 5e-9 * np.random.default_rng(4).standard_normal(u.size)
+    y = stage.simulate(u, 1e-3).x + drift * np.exp(-t / 3.0) + noise
+    return pt.Dataset(u=u, y=y, dt=1e-3)
+
+
+def test_a_drift_of_few_turns_is_found_where_it_leaves_nothing_but_noise() -> None:
+    for model, drift, found in (
+        ("bouc-wen", 3e-7, True),
+        ("bouc-wen", 0.0, False),
+        # An error of the model stays beside a drift.
+        ("first-order-dahl", 3e-7, False),
+    ):
+        fit = pt.identify(of_few_turns(drift), model)
+        assert (fit.drift is not None) == found
+        if fit.drift is not None:
+            assert fit.cost < 1.1 * 5e-9
+            assert fit.drift.amplitude == pytest.approx(drift, rel=0.1)
+
+
 def test_the_time_constant_has_a_standard_deviation() -> None:
     """Of twelve records with other noise the time constants spread by it."""
     fits = [with_drift(record(drift=(6e-7, 12.0), seed=seed)) for seed in range(12)]
@@ -237,10 +269,11 @@ def test_a_drift_is_what_is_left_of_an_exponential(time: float) -> None:
 
 
 def test_a_loop_that_is_not_closed_is_no_drift() -> None:
-    """Fewer than six reversals: none, unless its time constant is given."""
+    """Fewer than six reversals: none, unless one is given."""
     data = record(seconds=4.0)
-    assert with_drift(data).drift is None
-    assert with_drift(data, drift=5.0).drift is not None
+    assert with_drift(data, drift=None).drift is None
+    for given in (True, 5.0):
+        assert with_drift(data, drift=given).drift is not None
 
 
 def test_a_drift_that_is_a_part_of_the_motion_is_said() -> None:

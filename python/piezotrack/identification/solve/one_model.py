@@ -18,7 +18,12 @@ from .jump import rest_of, with_rest, with_rest_tried
 from .search import search_parameters
 from .several_records import search_several_records
 from .variants.delay import with_delay_tried
-from .variants.drift import drifts_of, with_drift_tried, with_drifts
+from .variants.drift import (
+    drifts_of,
+    with_drift_of_few_turns,
+    with_drift_tried,
+    with_drifts,
+)
 from .variants.exponent import may_have_exponent, with_exponent_tried
 from .weights import solve_least_squares
 
@@ -74,7 +79,7 @@ def identify_model(
         As for `identify`.
     """
 
-    def identify(other: Problem, start: Structure | None, rest: Rest | None) -> Identification:
+    def still(other: Problem, start: Structure | None, rest: Rest | None) -> Identification:
         def plain(one: Problem, begun: Structure | None = None) -> Identification:
             return _identify(one, method, run, begun or start)
 
@@ -102,6 +107,12 @@ def identify_model(
         # What is worse than another model without a jump lacks more than that.
         worse = start is not None and fit.cost > start.cost
         return fit if worse or len(other.records) > 1 else with_rest_tried(other, fit, at_rest)
+
+    def identify(other: Problem, start: Structure | None, rest: Rest | None) -> Identification:
+        fit = still(other, start, rest)
+        if not isinstance(method, Descents):
+            return fit
+        return with_drift_of_few_turns(other, fit, lambda one: still(one, start, rest))
 
     return with_delay_tried(problem, method, start, rest, identify, run.threads)
 

@@ -20,7 +20,7 @@ from ..methods.least_squares import LeastSquares
 from .judging import is_white, judged, noise_of, period_of, two_parts
 from .jump import rest_of
 from .one_model import identify_model, weights_of
-from .variants.drift import with_drifts
+from .variants.drift import turns_often, with_drifts
 from .weights import Structure
 
 if TYPE_CHECKING:
@@ -55,6 +55,8 @@ SEARCHED = ("first-order-dahl", "parallel-dahl", "bouc-wen")
 # Of these, one of few values predicts other motions where plays describe only the record: tried
 # where those leave more than so many times the noise.
 FEW_VALUES, MORE_THAN_NOISE = "bouc-wen", 1.02
+# What it may leave relative to a fit of many weights, each of which takes some noise away.
+AS_WELL = 1.01
 # Models that contain another one, whose search costs less: tried where it is near the best.
 CONTAINED = {"parallel-dahl": "first-order-dahl"}
 NEAR_BEST = 1.5
@@ -127,39 +129,8 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
         raise trials.refused or DataError("no model could be fitted")
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
 
-    def whole(one: Tried, start: Structure | None) -> Identification:
-        """Fit a model to the whole records, from the structure of their first parts or anew."""
-        kept = None if start is None else replace(start, kept=True)
-        # What is chosen anew has a voltage of rest of its own.
-        rest = one.rest if start is one.start else None
-        of_model = trials.whole(problem, one.info)
-        return identify_model(of_model, methods.method(one.info), run, kept, rest)
-
     with shares.begin(len(infos)):
-        fit = whole(best, best.start)
-        noise = max(noise_of(record.data) for record in problem.records)
-        one = trials.of_few_values(best, fit)
-        if one is not None and fit.cost > MORE_THAN_NOISE * min(fit.noises):
-            # Few values that describe the whole record as well as many weights do predict more.
-            with suppress(DataError, NumericalError):
-                of_model = _as_shown(problem, Structure.of(fit)).of_model(one.info)
-                rest = rest_of(fit)
-                other = identify_model(of_model, methods.method(one.info), run, rest=rest)
-                if other.cost < fit.cost:
-                    best, fit = one, other
-        if best.info.name == MANY_WEIGHTS or fit.cost > NOTHING_BUT_NOISE * noise:
-            # The first part does not show all that the whole record does.
-            least = (1.0 - BETTER_ON_WHOLE) * fit.cost
-            if best.info.name == MANY_WEIGHTS:
-                least = fit.cost / (1.0 - BETTER_ON_WHOLE)
-            for one in trials.others(best):
-                with suppress(DataError, NumericalError):
-                    if (other := whole(one, one.start)).cost < least:
-                        best, fit, least = one, other, other.cost
-        # The structure of the first part is that of the whole where nothing but noise is left.
-        resumed = best.start is not None and methods.weights._resumes
-        if resumed and fit.cost >= NOTHING_BUT_NOISE * min(fit.noises):
-            fit = min(fit, whole(best, None), key=lambda one: one.cost)
+        fit = _OnWholes(problem, methods, run, trials).fit(best)
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
 
 
@@ -234,12 +205,14 @@ class _Trials:
     def of_few_values(self, best: Tried, whole: Identification) -> Tried | None:
         """Return the trial of the model of few values, where it may be better than one of many.
 
-        It is near the best one, or was judged with a drift in what was not fitted.
+        It is near the best one, or was judged with a drift in what was not fitted, or a drift may
+        be in what was, of which least squares find none.
         """
         if best.start is None or self.least <= MORE_THAN_NOISE:
             return None
         pairs = zip(whole.records, best.start.drifts, strict=True)
         drifts = any(record.drift and not before for record, before in pairs)
+        drifts = drifts or not all(turns_often(record) for record in self.problem.records)
         if not drifts and not self.near_best(FEW_VALUES):
             return None
         return next((one for one in self.found if one.info.name == FEW_VALUES), None)
@@ -324,6 +297,83 @@ class _Trials:
             return error
         ill = bool(fit.model._notes(lambda: fit._responses[0]))
         return _Attempt(fit, left, ill, time.perf_counter() - begun)
+
+
+class _Whole(NamedTuple):
+    """A model, and its fit to whole records."""
+
+    best: Tried
+    fit: Identification
+
+
+@dataclass(frozen=True)
+class _OnWholes:
+    """Fits to whole records, of which the first parts do not show all."""
+
+    problem: Problem
+    methods: MethodChoice
+    how: Run
+    trials: _Trials
+
+    def fit(self, best: Tried) -> Identification:
+        """Fit the best model, or another one that leaves far less on the whole records."""
+        found = _Whole(best, self.fitted(best, best.start, best.rest))
+        noise = max(noise_of(record.data) for record in self.problem.records)
+        if best.info.name == MANY_WEIGHTS or found.fit.cost > NOTHING_BUT_NOISE * noise:
+            found = self.least(found)
+        # The structure of the first part is that of the whole where nothing but noise is left.
+        if found.fit.cost >= NOTHING_BUT_NOISE * min(found.fit.noises):
+            found = self.anew(found)
+        return self.of_few_values(found)
+
+    def fitted(
+        self, one: Tried, start: Structure | None = None, rest: Rest | None = None
+    ) -> Identification:
+        """Fit a model, from a structure or anew."""
+        kept = None if start is None else replace(start, kept=True)
+        of_model = self.trials.whole(self.problem, one.info)
+        return identify_model(of_model, self.methods.method(one.info), self.how, kept, rest)
+
+    def least(self, found: _Whole, shown: Structure | None = None) -> _Whole:
+        """Return what was found, or another model that leaves far less.
+
+        Others begin with the structures of their first parts, or with what the whole has shown.
+        """
+        (best, fit), share = found, 1.0 - BETTER_ON_WHOLE
+        enough = fit.cost / share if best.info.name == MANY_WEIGHTS else share * fit.cost
+        for one in self.trials.others(best):
+            with suppress(DataError, NumericalError):
+                start, rest = (shown, rest_of(fit)) if shown else (one.start, one.rest)
+                if (other := self.fitted(one, start, rest)).cost < enough:
+                    found, enough = _Whole(one, other), other.cost
+        return found
+
+    def anew(self, found: _Whole) -> _Whole:
+        """Fit the best model of many weights anew, and others where it shows further dynamics."""
+        best, fit = found
+        one = next((one for one in [best, *self.trials.others(best)] if one.start), None)
+        if one is None or one.start is None or not self.methods.weights._resumes:
+            return found
+        with suppress(DataError, NumericalError):
+            anew = self.fitted(one)
+            if anew.cost < (1.0 if one is best else 1.0 - BETTER_ON_WHOLE) * fit.cost:
+                found, shown = _Whole(one, anew), Structure.of(anew)
+                if len(shown.dynamics) > len(one.start.dynamics):
+                    return self.least(found, shown)
+        return found
+
+    def of_few_values(self, found: _Whole) -> Identification:
+        """Return what was found, or a fit of few values that explains as much: it predicts more."""
+        best, fit = found
+        few = self.trials.of_few_values(best, fit)
+        if few is not None and fit.cost > MORE_THAN_NOISE * min(fit.noises):
+            with suppress(DataError, NumericalError):
+                problem = _as_shown(self.problem, Structure.of(fit)).of_model(few.info)
+                method = self.methods.method(few.info)
+                other = identify_model(problem, method, self.how, rest=rest_of(fit))
+                if other.cost < AS_WELL * fit.cost:
+                    return other
+        return fit
 
 
 def _with_delays(problem: Problem, start: Structure) -> Problem:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .... import _core
 from ....errors import DataError, NumericalError
 from ...fitted.drift import Drift
-from ...problem.objective import Objective
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -18,11 +18,21 @@ if TYPE_CHECKING:
     from ...problem.problem import Problem
     from ...problem.records import Record
 
-__all__ = ["GAIN", "drifts_of", "with_drift_tried", "with_drifts"]
+__all__ = [
+    "GAIN",
+    "drifts_of",
+    "turns_often",
+    "with_drift_of_few_turns",
+    "with_drift_tried",
+    "with_drifts",
+]
 
 # Share of the cost that drifts have to take away, as an error of the model may look like one, and
 # share of the residual from which they are tried: the parameters have taken a part of them.
 GAIN, SIGN = 0.2, 0.1
+# A drive turns often that turns so many times, by so large a share of its range; and what a drift
+# of another one may leave, in multiples of the noise.
+REVERSALS, LARGE_TURN, NOTHING_BUT_NOISE = 6, 0.1, 1.1
 # Time constants of drifts that are taken off a residual, as shares of its window.
 TIMES = (0.1, 0.3, 1.0, 10.0)
 
@@ -30,7 +40,7 @@ TIMES = (0.1, 0.3, 1.0, 10.0)
 def with_drift_tried(
     problem: Problem, fit: Identification, search: Callable[[Problem], Identification]
 ) -> Identification:
-    """Search with a drift of each record of which nothing is given and whose residual shows one.
+    """Search with a drift of each record of many turns whose residual shows one.
 
     Parameters
     ----------
@@ -47,13 +57,53 @@ def with_drift_tried(
         The one with drifts where these lower the cost by 20 %.
     """
     shown = [
-        record.drift is None and record.offset and _shows_drift(problem, record, fit)
+        _may_drift(record) and turns_often(record) and _shows_drift(record, fit)
         for record in problem.records
     ]
-    if not any(shown):
+    return _drifted(problem, fit, shown, search)
+
+
+def with_drift_of_few_turns(
+    problem: Problem, fit: Identification, search: Callable[[Problem], Identification]
+) -> Identification:
+    """Search with a drift of each record of few turns, where a fit leaves more than noise.
+
+    A loop that is not closed looks like a drift, and the parameters have taken most of one: the
+    residual does not show it.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    fit : Identification
+        Its result without a drift.
+    search : callable
+        What solves a problem.
+
+    Returns
+    -------
+    Identification
+        The one with drifts where these lower the cost by 20 %, and leave nothing but noise: an
+        error of the model stays beside a drift.
+    """
+    if fit.cost <= NOTHING_BUT_NOISE * max(fit.noises):
+        return fit
+    few = [_may_drift(record) and not turns_often(record) for record in problem.records]
+    drifted = _drifted(problem, fit, few, search)
+    return drifted if drifted.cost <= NOTHING_BUT_NOISE * max(drifted.noises) else fit
+
+
+def _drifted(
+    problem: Problem,
+    fit: Identification,
+    drifting: list[bool],
+    search: Callable[[Problem], Identification],
+) -> Identification:
+    """Search with drifts of some records; the fit where these lower the cost too little."""
+    if not any(drifting):
         return fit
     try:
-        drifted = search(with_drifts(problem, shown))
+        drifted = search(with_drifts(problem, drifting))
     except (DataError, NumericalError):
         return fit
     return drifted if drifted.cost < (1.0 - GAIN) * fit.cost else fit
@@ -97,8 +147,30 @@ def drifts_of(fit: Identification) -> list[bool]:
     return [one.drift is not None for one in fit.records]
 
 
-def _shows_drift(problem: Problem, record: Record, fit: Identification) -> bool:
-    """Return whether a drift lowers the residual of a record, and its drive repeats."""
+def _may_drift(record: Record) -> bool:
+    """Return whether nothing is given of a drift."""
+    return record.drift is None and record.offset
+
+
+def turns_often(record: Record) -> bool:
+    """Return whether the drive turns so often that an open loop does not look like a drift.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+
+    Returns
+    -------
+    bool
+        Six times or more, by a tenth of its range.
+    """
+    u = record.data.counted(record.data.u)
+    return len(_core.turns(u, LARGE_TURN * float(np.ptp(u)))) >= REVERSALS
+
+
+def _shows_drift(record: Record, fit: Identification) -> bool:
+    """Return whether a drift lowers the residual of a record."""
     data = record.data
     left = data.counted(data.y - fit.simulate(data).x)
     t = data.counted(data.t)
@@ -107,7 +179,4 @@ def _shows_drift(problem: Problem, record: Record, fit: Identification) -> bool:
     drifts = (
         Drift(amplitude=1.0, time=share * (end - begin), begin=begin, end=end) for share in TIMES
     )
-    if not any(float(np.std(one.left_of(t, left))) < (1.0 - SIGN) * rms for one in drifts):
-        return False
-    alone = replace(record, drift=True, history="virgin")
-    return "drift_time" in Objective._of(replace(problem, records=(alone,))).ranges
+    return any(float(np.std(one.left_of(t, left))) < (1.0 - SIGN) * rms for one in drifts)

@@ -24,11 +24,11 @@ pub enum DriftKind {
     None,
     /// With this time constant, s.
     Time(f64),
-    /// Chosen from the record.
+    /// Fitted in a search; by least squares chosen from the record.
     Auto,
 }
 
-/// Fewest reversals of the drive that tell a drift.
+/// Fewest reversals of the drive.
 const REVERSALS: usize = 6;
 
 /// Smallest reversal that counts, as a share of the drive's range.
@@ -59,7 +59,6 @@ impl DriftKind {
         match self {
             Self::None => Ok(none),
             Self::Time(time) => Ok(Coordinate::Fixed(positive("drift", time, "s")?)),
-            Self::Auto if !repeats(&record.drive.u[record.window.clone()]) => Ok(none),
             Self::Auto => {
                 let length = record.drive.dt * index(record.window.len() - 1);
                 let [low, high] = [DRIFT_TIMES.0, DRIFT_TIMES.1].map(|share| share * length);
@@ -69,7 +68,7 @@ impl DriftKind {
     }
 }
 
-/// Whether a drive comes back often enough for a drift to be told from a loop that is not closed.
+/// Whether a drive comes back so often that a loop which is not closed does not look like a drift.
 pub(in crate::identify) fn repeats(u: &[f64]) -> bool {
     let (low, high) = range(u);
     turns(u, LARGE_TURN * (high - low)).len() >= REVERSALS

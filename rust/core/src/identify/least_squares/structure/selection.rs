@@ -45,7 +45,8 @@ const ROWS_OF_LEVELS: usize = 4000;
 /// How many times as many of a record whose drive jumps: what follows a jump is soon over.
 const OF_JUMPS: usize = 4;
 
-/// Starts of one history each that are refined: those of least cost.
+/// Starts of one history each that are carried to the end, those of least cost: which of them ends
+/// lower shows only with nodes and all parts chosen.
 const REFINED: usize = 2;
 
 /// Fits anew from the structure that was found, at most: weights and dead zones may stand where
@@ -122,14 +123,23 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     let mut begun = distinct(begun);
     begun.sort_by(|a, b| refinement.cost(a).total_cmp(&refinement.cost(b)));
     begun.truncate(REFINED);
-    let found = with_each(&begun, |start| {
+    let refined = with_each(&begun, |start| {
         let mut trial = start.clone();
         refinement.refine(&mut trial, FIRST_ROUNDS)?;
         Some(trial)
     })?;
+    let found = with_each(&distinct(refined), |start| completed(start, &refinement, &first))?;
     let better =
         |a: Fit<'a>, b: Fit<'a>| if refinement.cost(&b) < refinement.cost(&a) { b } else { a };
-    let mut fit = found.into_iter().reduce(better)?;
+    let fit = found.into_iter().reduce(better)?;
+    with_range_of_lags(fit, settings)
+}
+
+/// A start with its nodes and all parts chosen, and from there anew from the `first` fit while that
+/// is better.
+fn completed<'a>(start: &Fit<'a>, refinement: &Refinement<'_>, first: &Fit<'a>) -> Option<Fit<'a>> {
+    let settings = refinement.settings;
+    let mut fit = start.clone();
     choose_nodes(&mut fit, settings)?;
     refinement.refine(&mut fit, ROUNDS)?;
     drop_once(&mut fit, settings)?;
@@ -142,7 +152,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         }
         fit = anew;
     }
-    with_range_of_lags(fit, settings)
+    Some(fit)
 }
 
 /// The fit with the smallest lag that explains the record as well, and the range of such lags.
