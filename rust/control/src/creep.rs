@@ -87,11 +87,16 @@ impl<const N: usize, T: Real> Default for CreepState<N, T> {
 }
 
 /// The displacement d (m) for the input h (m) and the outputs q (m) of the relaxations.
+///
+/// No closure: those of lanes are not compiled for their instruction set unless they are inlined.
 #[must_use]
 #[inline(always)]
 pub fn output<N: Number>(relaxations: &[Creep], input: N, reached: &[N]) -> N {
-    let crept = relaxations.iter().zip(reached);
-    crept.fold(input, |sum, (creep, reached)| sum + input.like(creep.share) * *reached)
+    let mut sum = input;
+    for (creep, reached) in relaxations.iter().zip(reached) {
+        sum = sum + input.like(creep.share) * *reached;
+    }
+    sum
 }
 
 /// One step of every relaxation, in which the input goes in a straight line from `from` to `to`, m.

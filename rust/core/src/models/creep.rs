@@ -272,12 +272,14 @@ impl Relaxation {
     /// Displacement and velocity that the modes beside the main one add.
     #[inline(always)]
     fn beside<N: Number>(&self, state: &RelaxationState<N>) -> (N, N) {
-        let modes = self.dynamics.further().iter().zip(state.mode_x.iter().zip(&state.mode_v));
         let zero = state.x.like(0.0);
-        modes.fold((zero, zero), |(x, v), (mode, (place, speed))| {
+        let (mut x, mut v) = (zero, zero);
+        let states = state.mode_x.iter().zip(&state.mode_v);
+        for (mode, (place, speed)) in self.dynamics.further().iter().zip(states) {
             let weight = zero.like(mode.weight);
-            (x + weight * *place, v + weight * *speed)
-        })
+            (x, v) = (x + weight * *place, v + weight * *speed);
+        }
+        (x, v)
     }
 
     /// The state in equilibrium with an input that has long been `input`, m.

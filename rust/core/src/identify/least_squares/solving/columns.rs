@@ -167,7 +167,7 @@ impl<'f, 'a> Columns<'f, 'a> {
         }
         let steps: Vec<(usize, Hold)> =
             (first..first + count).map(|at| (self.strides.gap(at), self.hold.until(at))).collect();
-        self.follow_stage(&steps);
+        dispatch_fused(OfStage { columns: self, steps: &steps });
         let mut step = usize::from(first == 0);
         for alike in steps[step..].chunk_by(|a, b| a == b) {
             let (gap, hold) = alike[0];
@@ -190,7 +190,8 @@ impl<'f, 'a> Columns<'f, 'a> {
         Some(places)
     }
 
-    /// Follow the columns of the stage's own input and creep over so many intervals each.
+    /// Follows the columns of the stage's own input and creep over so many intervals each.
+    #[inline(always)]
     fn follow_stage(&mut self, steps: &[(usize, Hold)]) {
         let Parts { whole, bare, nudged, decay } = &self.parts;
         let mut stage = self.followers[self.inner];
@@ -222,6 +223,21 @@ impl<'f, 'a> Columns<'f, 'a> {
                 *slot = value;
             }
         }
+    }
+}
+
+/// Columns of the stage's own input and creep along some samples.
+struct OfStage<'s, 'f, 'a> {
+    columns: &'s mut Columns<'f, 'a>,
+    steps: &'s [(usize, Hold)],
+}
+
+impl WithSimd for OfStage<'_, '_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) {
+        self.columns.follow_stage(self.steps);
     }
 }
 

@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
+use pulp::{Simd, WithSimd};
+
 use super::fit::Fit;
 use super::follower::Follower;
 use super::late::Late;
 use super::strides::{Stepped, Strides};
 use crate::error::Result;
 use crate::identify::records::history::{History, voltages_before};
+use crate::math::dispatch_fused;
 use crate::models::{Dynamics, Experiment, Relaxation, Rest, Values};
 use crate::signal::index;
 
@@ -149,6 +152,13 @@ impl<'a> Fit<'a> {
             let stage = self.common.model.build(&values)?;
             return Ok(stage.simulate(&experiment)?.ok_or_else(Self::stopped)?.x);
         }
+        dispatch_fused(Between { fit: self, r })
+    }
+
+    /// Displacement of record `r`, m, between whose samples the signals go in straight lines.
+    #[inline(always)]
+    fn between(&self, r: usize) -> Result<Vec<f64>> {
+        let drive = self.common.records[r].drive;
         let end = self.windows[r].end;
         let strides = Strides::of(self, r, end);
         let whole = Stepped::new(self.relaxation()?, drive.dt, strides.longest());
@@ -193,5 +203,20 @@ impl<'a> Fit<'a> {
         let sum = of_motion * self.sum(&path.signals);
         let rest = Rest { x, volts, sum, memory: &memory, creep: &creep, modes };
         Ok(self.common.of.state_at_rest(&rest))
+    }
+}
+
+/// Displacement of a record, where the processor has fused multiply-add.
+struct Between<'f, 'a> {
+    fit: &'f Fit<'a>,
+    r: usize,
+}
+
+impl WithSimd for Between<'_, '_> {
+    type Output = Result<Vec<f64>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        self.fit.between(self.r)
     }
 }
