@@ -178,20 +178,33 @@ impl Steps {
         })
     }
 
-    /// Response of the dynamics to a signal, from rest.
-    fn of(&self, input: &[f64]) -> Vec<f64> {
-        let (mut x, mut w) = (input.first().copied().unwrap_or(0.0), 0.0);
-        let mut all = Vec::with_capacity(input.len());
-        all.push(x);
-        for pair in input.windows(2) {
-            let at = [x, w, pair[0], pair[1]];
-            let dot =
-                |row: &[f64; 4]| row[0] * at[0] + row[1] * at[1] + row[2] * at[2] + row[3] * at[3];
-            (x, w) = (dot(&self.x), dot(&self.v));
+    /// Responses of the dynamics to some signals, from rest: side by side, as each sample waits for
+    /// the one before.
+    fn of<const N: usize>(&self, inputs: [&[f64]; N]) -> [Vec<f64>; N] {
+        let mut before = inputs.map(|one| one.first().copied().unwrap_or(0.0));
+        let (mut x, mut w) = (before, [0.0; N]);
+        let mut all = inputs.map(|one| Vec::with_capacity(one.len()));
+        for (all, x) in all.iter_mut().zip(x) {
             all.push(x);
+        }
+        let samples = inputs.iter().map(|one| one.len()).min().unwrap_or(0);
+        for k in 1..samples {
+            for (j, input) in inputs.iter().map(|one| one[k]).enumerate() {
+                let at = [x[j], w[j], before[j], input];
+                (x[j], w[j]) = (dot(&self.x, &at), dot(&self.v, &at));
+                before[j] = input;
+            }
+            for (all, x) in all.iter_mut().zip(x) {
+                all.push(x);
+            }
         }
         all
     }
+}
+
+#[inline(always)]
+fn dot(row: &[f64; 4], at: &[f64; 4]) -> f64 {
+    row[0] * at[0] + row[1] * at[1] + row[2] * at[2] + row[3] * at[3]
 }
 
 /// Signals with which the displacement is compared.
@@ -201,7 +214,7 @@ struct Trial<'a> {
     rows: Vec<usize>,
     y: Vec<f64>,
     /// Drive, plays, square of the drive: all go through each mode.
-    columns: Vec<Vec<f64>>,
+    columns: [Vec<f64>; 2 + THRESHOLDS.len()],
     /// Best of them without dynamics, then the drive.
     few: [Vec<f64>; 2],
 }
@@ -215,15 +228,17 @@ impl<'a> Trial<'a> {
         }
         let scaled = |volts: &f64| (volts - 0.5 * (low + high)) / width;
         let u: Vec<f64> = drive.u.iter().map(scaled).collect();
-        let mut columns = vec![u.clone(), u.iter().map(|u| u * u).collect()];
-        for threshold in THRESHOLDS {
+        let columns = core::array::from_fn(|j| {
+            let Some(threshold) = j.checked_sub(2).map(|i| THRESHOLDS[i]) else {
+                return if j == 0 { u.clone() } else { u.iter().map(|u| u * u).collect() };
+            };
             let mut play = u[0];
-            let mut follow = |u: &f64| {
+            let follow = |u: &f64| {
                 play = (u - threshold).max((u + threshold).min(play));
                 play
             };
-            columns.push(u.iter().map(&mut follow).collect());
-        }
+            u.iter().map(follow).collect()
+        });
         let every = (y.len() - start).div_ceil(MOST_ROWS);
         let rows: Vec<usize> = (start..y.len()).step_by(every).collect();
         let y = rows.iter().map(|&k| y[k]).collect();
@@ -235,7 +250,7 @@ impl<'a> Trial<'a> {
     }
 
     /// RMS deviation and weights of groups of columns, a constant and a drift.
-    fn fit(&self, groups: &[&Vec<Vec<f64>>]) -> (f64, Vec<f64>) {
+    fn fit(&self, groups: &[&[Vec<f64>]]) -> (f64, Vec<f64>) {
         let all: Vec<&Vec<f64>> = groups.iter().flat_map(|group| group.iter()).collect();
         let unknowns = all.len() + 2;
         let mut rows = Rows::new(unknowns);
@@ -258,7 +273,10 @@ impl<'a> Trial<'a> {
             let Some(steps) = Steps::new(mode.dynamics(), &self.drive) else {
                 return inputs.to_vec();
             };
-            inputs.iter().map(|input| steps.of(input)).collect()
+            if i == 0 {
+                return steps.of(self.columns.each_ref().map(Vec::as_slice)).to_vec();
+            }
+            steps.of([&self.few[0]]).to_vec()
         };
         modes.iter().enumerate().map(of).collect()
     }
@@ -280,7 +298,7 @@ impl<'a> Trial<'a> {
             let (before, after) = (k.saturating_sub(1), (k + 1).min(last));
             (u[after] - u[before]) / index(after - before)
         };
-        let (moved, mut rows) = (steps.of(u), Rows::new(3));
+        let ([moved], mut rows) = (steps.of([u]), Rows::new(3));
         for &k in &self.rows {
             rows.push(&[u[k], rate(k), 1.0], moved[k]);
         }
@@ -291,7 +309,7 @@ impl<'a> Trial<'a> {
 
     fn cost(&self, modes: &[Mode]) -> (f64, Vec<f64>) {
         let behind = self.behind(modes);
-        self.fit(&behind.iter().collect::<Vec<_>>())
+        self.fit(&behind.iter().map(Vec::as_slice).collect::<Vec<_>>())
     }
 
     /// RMS deviation without a mode: the least with a lag of any length.
@@ -303,7 +321,7 @@ impl<'a> Trial<'a> {
                 return None;
             }
             let Some(steps) = Steps::new(Dynamics::First { time }, &self.drive) else { break };
-            let behind = self.columns.iter().map(|input| steps.of(input)).collect();
+            let behind = steps.of(self.columns.each_ref().map(Vec::as_slice));
             least = least.min(self.fit(&[&behind]).0);
             time *= 2.0;
         }
@@ -360,8 +378,7 @@ impl<'a> Trial<'a> {
     /// Squares that two columns behind a mode leave of a signal, its mean left out.
     fn quick(&self, mode: Mode, rest: &[f64]) -> f64 {
         let Some(steps) = Steps::new(mode.dynamics(), &self.drive) else { return f64::INFINITY };
-        let [one, two] = self.few.each_ref().map(|input| {
-            let all = steps.of(input);
+        let [one, two] = steps.of(self.few.each_ref().map(Vec::as_slice)).map(|all| {
             let picked: Vec<f64> = self.rows.iter().map(|&k| all[k]).collect();
             centred(picked)
         });
@@ -417,7 +434,7 @@ impl<'a> Trial<'a> {
     /// Where the problem linearised in weights and modes has its solution.
     fn goal(&self, modes: &[Mode], edges: (f64, f64)) -> Vec<Mode> {
         let behind = self.behind(modes);
-        let (_, weights) = self.fit(&behind.iter().collect::<Vec<_>>());
+        let (_, weights) = self.fit(&behind.iter().map(Vec::as_slice).collect::<Vec<_>>());
         let all: Vec<&Vec<f64>> = behind.iter().flatten().collect();
         let nudge = 1e-4;
         let mut slopes: Vec<Vec<f64>> = Vec::new();
@@ -431,7 +448,11 @@ impl<'a> Trial<'a> {
                 (0..self.drive.u.len()).map(at).collect()
             };
             first += count;
-            let run = |mode: Mode| Steps::new(mode.dynamics(), &self.drive).map(|s| s.of(&input));
+            let run = |mode: Mode| {
+                let steps = Steps::new(mode.dynamics(), &self.drive)?;
+                let [moved] = steps.of([&input]);
+                Some(moved)
+            };
             for axis in 0..2 {
                 let mut other = *mode;
                 other.0[axis] += nudge;
