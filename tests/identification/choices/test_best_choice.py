@@ -96,10 +96,10 @@ def test_a_model_that_fits_the_whole_record_far_better_is_taken(
     best = default.selection.trials[0].model
     assert best != default.model.info.name
 
-    def refused(problem: Any, *arguments: Any) -> Any:
+    def refused(problem: Any, *arguments: Any, **more: Any) -> Any:
         if len(problem.records[0].data) == len(data) and problem.model != best:
             raise pt.NumericalError("no candidate could be simulated")
-        return identify_model(problem, *arguments)
+        return identify_model(problem, *arguments, **more)
 
     monkeypatch.setattr(selection, "identify_model", refused)
     assert pt.identify(data).model.info.name == best
