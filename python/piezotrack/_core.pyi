@@ -77,6 +77,7 @@ __all__ = [
     "tune",
     "tuning_costs",
     "turns",
+    "turns_often",
     "voltages_before",
 ]
 
@@ -693,6 +694,7 @@ class StepResponse:
 
 def read_step(u: ArrayLike, y: ArrayLike, dt: float, hold_name: str) -> StepResponse: ...
 def turns(signal: ArrayLike, least: float) -> list[int]: ...
+def turns_often(u: ArrayLike) -> bool: ...
 
 @final
 class LeastSquaresFit:

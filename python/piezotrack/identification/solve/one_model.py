@@ -195,9 +195,7 @@ def _with_history_shown(problem: Problem, method: Search, run: Run) -> Identific
     with parts.begin(0):
         fit = virgin = search_parameters(with_history("virgin"), method, run)
     alone = least = refined_cost(with_history("virgin"), virgin, run.threads)
-    # A part of the record may show a drift where the whole of it does not.
-    shown = record if fit.drift else replace(record, drift=False)
-    for other in earlier_motion(replace(problem, records=(shown,)), virgin, alone, run.threads):
+    for other in earlier_motion(problem, virgin, alone, run.threads):
         if other.share * alone < (1.0 - GAIN) * least:
             with parts.begin(1):
                 other_fit = search_parameters(

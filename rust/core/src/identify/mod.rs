@@ -43,7 +43,7 @@ pub use parameters::candidate::{
 pub use parameters::constraint::Constraint;
 pub use parameters::coordinate::{Coordinate, Scale};
 pub use parameters::delay::Delay;
-pub use parameters::drift::DriftKind;
+pub use parameters::drift::{DriftKind, turns_often};
 pub use parameters::prior::Prior;
 pub use parameters::relations::Relations;
 pub use parameters::tie::Tie;

@@ -13,7 +13,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyConventional>()?;
     module.add_class::<PyStepResponse>()?;
     module.add_function(wrap_pyfunction!(read_step, module)?)?;
-    module.add_function(wrap_pyfunction!(turns, module)?)
+    module.add_function(wrap_pyfunction!(turns, module)?)?;
+    module.add_function(wrap_pyfunction!(turns_often, module)?)
 }
 
 /// Results of the paper's formulas for readings.
@@ -151,4 +152,10 @@ fn read_step(
 #[pyfunction]
 fn turns(signal: &Bound<'_, PyAny>, least: f64) -> PyResult<Vec<usize>> {
     Ok(signal::turns(&samples("signal", signal)?, least))
+}
+
+/// Whether a drive turns so often that a loop which is not closed does not look like a drift.
+#[pyfunction]
+fn turns_often(u: &Bound<'_, PyAny>) -> PyResult<bool> {
+    Ok(identify::turns_often(&samples("u", u)?))
 }

@@ -30,9 +30,8 @@ __all__ = [
 # Share of the cost that drifts have to take away, as an error of the model may look like one, and
 # share of the residual from which they are tried: the parameters have taken a part of them.
 GAIN, SIGN = 0.2, 0.1
-# A drive turns often that turns so many times, by so large a share of its range; and what a drift
-# of another one may leave, in multiples of the noise.
-REVERSALS, LARGE_TURN, NOTHING_BUT_NOISE = 6, 0.1, 1.1
+# What a drift under a drive of few turns may leave, in multiples of the noise.
+NOTHING_BUT_NOISE = 1.1
 # Time constants of drifts that are taken off a residual, as shares of its window.
 TIMES = (0.1, 0.3, 1.0, 10.0)
 
@@ -165,8 +164,7 @@ def turns_often(record: Record) -> bool:
     bool
         Six times or more, by a tenth of its range.
     """
-    u = record.data.counted(record.data.u)
-    return len(_core.turns(u, LARGE_TURN * float(np.ptp(u)))) >= REVERSALS
+    return _core.turns_often(record.data.counted(record.data.u))
 
 
 def _shows_drift(record: Record, fit: Identification) -> bool:

@@ -69,7 +69,8 @@ impl DriftKind {
 }
 
 /// Whether a drive comes back so often that a loop which is not closed does not look like a drift.
-pub(in crate::identify) fn repeats(u: &[f64]) -> bool {
+#[must_use]
+pub fn turns_often(u: &[f64]) -> bool {
     let (low, high) = range(u);
     turns(u, LARGE_TURN * (high - low)).len() >= REVERSALS
 }

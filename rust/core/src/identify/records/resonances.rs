@@ -213,7 +213,7 @@ struct Trial<'a> {
     /// Samples that are compared.
     rows: Vec<usize>,
     y: Vec<f64>,
-    /// Drive, plays, square of the drive: all go through each mode.
+    /// Drive, its square, plays: all go through each mode.
     columns: [Vec<f64>; 2 + THRESHOLDS.len()],
     /// Best of them without dynamics, then the drive.
     few: [Vec<f64>; 2],
@@ -228,10 +228,8 @@ impl<'a> Trial<'a> {
         }
         let scaled = |volts: &f64| (volts - 0.5 * (low + high)) / width;
         let u: Vec<f64> = drive.u.iter().map(scaled).collect();
-        let columns = core::array::from_fn(|j| {
-            let Some(threshold) = j.checked_sub(2).map(|i| THRESHOLDS[i]) else {
-                return if j == 0 { u.clone() } else { u.iter().map(|u| u * u).collect() };
-            };
+        let squares = u.iter().map(|u| u * u).collect();
+        let [first, second, third, fourth] = THRESHOLDS.map(|threshold| {
             let mut play = u[0];
             let follow = |u: &f64| {
                 play = (u - threshold).max((u + threshold).min(play));
@@ -239,6 +237,7 @@ impl<'a> Trial<'a> {
             };
             u.iter().map(follow).collect()
         });
+        let columns = [u.clone(), squares, first, second, third, fourth];
         let every = (y.len() - start).div_ceil(MOST_ROWS);
         let rows: Vec<usize> = (start..y.len()).step_by(every).collect();
         let y = rows.iter().map(|&k| y[k]).collect();
@@ -269,14 +268,13 @@ impl<'a> Trial<'a> {
     /// The columns behind each mode: all of them behind the first, the best behind others.
     fn behind(&self, modes: &[Mode]) -> Vec<Vec<Vec<f64>>> {
         let of = |(i, mode): (usize, &Mode)| {
-            let inputs = if i == 0 { &self.columns[..] } else { &self.few[..1] };
-            let Some(steps) = Steps::new(mode.dynamics(), &self.drive) else {
-                return inputs.to_vec();
-            };
-            if i == 0 {
-                return steps.of(self.columns.each_ref().map(Vec::as_slice)).to_vec();
+            let steps = Steps::new(mode.dynamics(), &self.drive);
+            match (steps, i) {
+                (Some(steps), 0) => steps.of(self.columns.each_ref().map(Vec::as_slice)).to_vec(),
+                (Some(steps), _) => steps.of([&self.few[0]]).to_vec(),
+                (None, 0) => self.columns.to_vec(),
+                (None, _) => self.few[..1].to_vec(),
             }
-            steps.of([&self.few[0]]).to_vec()
         };
         modes.iter().enumerate().map(of).collect()
     }

@@ -17,7 +17,7 @@ use crate::identify::least_squares::settings::{
 };
 use crate::identify::least_squares::solving::fit::Fit;
 use crate::identify::least_squares::solving::form::Form;
-use crate::identify::parameters::drift::{DriftKind, repeats};
+use crate::identify::parameters::drift::{DriftKind, turns_often};
 use crate::identify::records::history::History;
 use crate::signal::range;
 
@@ -155,7 +155,7 @@ impl Refinement<'_> {
         let from = &fit.clone();
         let mut ways = self.other_creeps(from);
         for (r, record) in from.common.records.iter().enumerate() {
-            if record.drift != DriftKind::Auto || !repeats(&record.drive.u[record.start..]) {
+            if record.drift != DriftKind::Auto || !turns_often(&record.drive.u[record.start..]) {
                 continue;
             }
             if from.drifts[r].is_some() {

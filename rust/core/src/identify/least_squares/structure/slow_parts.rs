@@ -8,7 +8,7 @@ use crate::identify::least_squares::settings::{
 };
 use crate::identify::least_squares::solving::fit::{Fit, known_drift};
 use crate::identify::least_squares::solving::form::Form;
-use crate::identify::parameters::drift::{DRIFT_TIMES, DriftKind, repeats};
+use crate::identify::parameters::drift::{DRIFT_TIMES, DriftKind, turns_often};
 use crate::math::{least, on_all_threads};
 use crate::signal::index;
 
@@ -109,7 +109,7 @@ fn choose_drifts(fit: &mut Fit<'_>) -> Option<()> {
         let record = &fit.common.records[r];
         if record.drift != DriftKind::Auto
             || fit.drifts[r].is_some()
-            || !repeats(&record.drive.u[record.start..])
+            || !turns_often(&record.drive.u[record.start..])
         {
             continue;
         }
