@@ -4,4 +4,5 @@ pub(super) mod creep_weights;
 pub(super) mod history;
 pub(super) mod record;
 pub(super) mod resonances;
+mod sampled_dynamics;
 pub(super) mod thinned;
