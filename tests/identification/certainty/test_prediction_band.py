@@ -12,8 +12,8 @@ import pytest
 import piezotrack as pt
 from piezotrack.data.checks.diagnostics import turns
 from piezotrack.identification.confidence.held_out import HeldOut, held_out
-from piezotrack.identification.confidence.sensitivity import sensitivity
-from piezotrack.identification.confidence.values import fitted_values
+from piezotrack.identification.linearised.sensitivity import sensitivity
+from piezotrack.identification.linearised.values import fitted_values
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,11 +13,19 @@ import numpy as np
 from ... import _core
 from ...errors import DataError, PiezotrackError
 from ..fitted.certainty.covariance import Covariance, NoiseShares, is_hidden, left_open
+from ..linearised.sensitivity import STEP, LinearisedRecord, gradient, sensitivity
+from ..linearised.values import (
+    DELAY,
+    Value,
+    entries_of,
+    fitted_values,
+    free_values,
+    moved,
+    sizes_of,
+)
 from ..solve.judging import SAME_PERIOD, period_of
 from ..solve.search import details_of
 from .held_out import held_out
-from .sensitivity import STEP, LinearisedRecord, gradient, sensitivity
-from .values import DELAY, Value, entries_of, fitted_values, free_values, moved, sizes_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -29,7 +37,7 @@ if TYPE_CHECKING:
     from ..fitted.estimates import Estimate
     from ..fitted.identification import Identification
     from ..fitted.identified_model import IdentifiedModel
-    from .sensitivity import Sensitivity
+    from ..linearised.sensitivity import Sensitivity
 
     Array = NDArray[np.float64]
     Records = Sequence[tuple[Dataset, float]]

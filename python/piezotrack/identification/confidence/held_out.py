@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...data.checks.diagnostics import amplitudes, turns
-from .values import fitted_values, sizes_of
+from ..linearised.values import fitted_values, sizes_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from ...data.dataset import Dataset
     from ..fitted.identified_model import IdentifiedModel
-    from .sensitivity import Sensitivity
+    from ..linearised.sensitivity import Sensitivity
 
     Array = NDArray[np.float64]
     Places = NDArray[np.intp]

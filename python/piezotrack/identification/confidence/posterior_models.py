@@ -10,14 +10,14 @@ from ..._support.arguments import expect, positive
 from ...data.dataset import Dataset
 from ...errors import ParameterError
 from ..fitted.identified_model import IdentifiedModel
+from ..linearised.values import fitted_values, moved, sizes_of
 from .estimate import covariance_of
-from .values import fitted_values, moved, sizes_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..fitted.certainty.covariance import Covariance
-    from .values import Value
+    from ..linearised.values import Value
 
     Array = NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from ...errors import ParameterError, ShapeError
 from ..fitted.certainty.covariance import normal_reach
 from ..fitted.certainty.prediction_band import PredictionBand
 from ..fitted.identified_model import IdentifiedModel
+from ..linearised.sensitivity import changes, sensitivity
+from ..linearised.values import fitted_values
 from .estimate import covariance_of
 from .held_out import held_out
-from .sensitivity import changes, sensitivity
-from .values import fitted_values
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from ..fitted.certainty.covariance import Covariance
-    from .sensitivity import Sensitivity
+    from ..linearised.sensitivity import Sensitivity
 
     Array = NDArray[np.float64]
 

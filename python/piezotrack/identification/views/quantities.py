@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from ..._support.units import length_text, of_drive, shown_unit
 from ...errors import NumericalError
 from ...stages.slow_loop import SlowLoop
-from ..confidence.sensitivity import gradient
 from ..fitted.certainty.covariance import normal_reach
 from ..fitted.notes import start_notes
+from ..linearised.sensitivity import gradient
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -11,9 +11,9 @@ from scipy.special import stdtrit
 
 from ... import _core
 from ..._support.statistics import sample_noise
-from ..confidence.sensitivity import sensitivity
-from ..confidence.values import fitted_values
 from ..fitted.start import begin, same_beginning, start_after, start_at_jump
+from ..linearised.sensitivity import sensitivity
+from ..linearised.values import fitted_values
 from .correlated import Autoregression
 from .health import RATIOS, Change
 from .known import Known

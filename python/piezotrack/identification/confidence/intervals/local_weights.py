@@ -13,8 +13,8 @@ import numpy as np
 
 from .... import _core
 from ....errors import NumericalError
-from ..sensitivity import LinearisedRecord
-from ..values import DELAY, Value, fitted_values, moved, sizes_of
+from ...linearised.sensitivity import LinearisedRecord
+from ...linearised.values import DELAY, Value, fitted_values, moved, sizes_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -13,11 +13,11 @@ from ....errors import DataError, ParameterError, PiezotrackError
 from ...fitted.certainty.confidence import LowerMinimum
 from ...fitted.estimates import Estimate
 from ...fitted.start import start_after, start_at_jump
+from ...linearised.values import DELAY, Value, fitted_values, moved
 from ...problem.parameter import Parameter
 from ...problem.problem import Problem
 from ...problem.records import Record
 from ..estimate import covariance_of
-from ..values import DELAY, Value, fitted_values, moved
 from .local_weights import LocalWeights
 
 if TYPE_CHECKING:

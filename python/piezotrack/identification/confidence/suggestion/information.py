@@ -10,9 +10,9 @@ import numpy as np
 
 from ....errors import NumericalError, ParameterError
 from ...fitted.identified_model import IdentifiedModel
+from ...linearised.sensitivity import sensitivity
+from ...linearised.values import free_values, moved
 from ...solve.weights import CHOSEN
-from ..sensitivity import sensitivity
-from ..values import free_values, moved
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ....stages.base import Stage
     from ....stages.motion import StageState
     from ...fitted.identification import Identification
-    from ..values import Value
+    from ...linearised.values import Value
 
     Array = NDArray[np.float64]
 

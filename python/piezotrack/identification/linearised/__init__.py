@@ -1,0 +1,1 @@
+"""What an identified model was fitted with, and how a record changes with it."""
