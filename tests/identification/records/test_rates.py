@@ -93,3 +93,34 @@ def test_first_samples_that_carry_the_cost_are_named() -> None:
     (note,) = fit_notes.first_samples(rest, SLOW)
     assert "of the squared residual is in the first 0.0" in note
     assert "log[1.0" in note
+
+
+def test_a_mode_above_half_the_sampling_rate_is_found_in_a_sweep() -> None:
+    # The sweep ends at 40 Hz, a ninth of the mode; the stage is sampled at 500 Hz.
+    stiffness, natural, dt = 1e6, 2.0 * np.pi * 350.0, 2e-3
+    stage = pt.BoucWenStage(
+        mass=stiffness / natural**2,
+        damping=0.2 * stiffness / natural,
+        stiffness=stiffness,
+        piezo_coefficient=1e-6,
+        alpha=0.2,
+        beta=0.1,
+        gamma=0.05,
+    )
+    t = dt * np.arange(1001)
+    u = 50.0 - 50.0 * np.cos(2.0 * np.pi * (1.0 + 9.5 * t) * t)
+    y = stage.simulate(u, dt).x + 2e-8 * np.random.default_rng(1).standard_normal(t.size)
+    fit = pt.identify(pt.Dataset(u=u, y=y, dt=dt), "bouc-wen")
+    assert np.sqrt(stiffness / fit.model.mass) == pytest.approx(natural, rel=0.03)
+    assert fit.cost < 1.05 * 2e-8
+
+
+def test_a_record_of_one_amplitude_does_not_determine_smaller_loops() -> None:
+    def said(fit: pt.identification.Identification) -> bool:
+        return any("does not determine smaller loops" in note for note in fit.notes)
+
+    small = STAGE.record(0.5 * SLOW.full.u, SLOW.dt)[1.0:]
+    assert said(pt.identify(SLOW, "prandtl-ishlinskii"))
+    assert not said(pt.identify([SLOW, small], "prandtl-ishlinskii"))
+    # A model of few values has the same form at every amplitude.
+    assert not said(pt.identify(SLOW, "bouc-wen"))

@@ -39,7 +39,9 @@ pub use input::superposition::{
 };
 pub use lanes::{LanedPlant, LanedVisitor};
 pub(crate) use nodes::check_nodes;
-pub use parameters::search_ranges::{Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges};
+pub use parameters::search_ranges::{
+    HIGHEST_MODE, Measures, ModeShown, NOMINAL_STIFFNESS, Range, Ranges,
+};
 pub use parameters::values::{Held, ParameterInfo, Values, position};
 pub use plant::{KernelFlow, KernelModel, Plant, Settling};
 pub use plays::asymmetric_prandtl_ishlinskii::{

@@ -9,7 +9,7 @@ use core::f64::consts::LN_2;
 
 use super::sampled_dynamics::Steps;
 use crate::math::{FREE, Rows};
-use crate::models::Dynamics;
+use crate::models::{Dynamics, HIGHEST_MODE};
 use crate::signal::{Drive, Stop, index, range};
 
 /// Thresholds of the plays, as shares of the drive's range.
@@ -20,10 +20,6 @@ const MOST_ROWS: usize = 6000;
 
 /// Damping ratios of the grid, each with the ratio of neighbouring frequencies.
 const GRID: [(f64, f64); 3] = [(0.02, 1.03), (0.07, 1.08), (0.25, 1.2)];
-
-/// Highest frequency of a mode, in cycles a sample: above half of one, the drive between the samples
-/// distinguishes it from the slower mode that rings alike at them.
-pub(in crate::identify) const HIGHEST: f64 = 0.75;
 
 /// Fewest cycles of a mode in the window.
 const CYCLES: f64 = 3.0;
@@ -74,7 +70,7 @@ pub fn resonances(
     }
     let Some(trial) = Trial::new(drive, y, start) else { return Some(found) };
     let length = drive.dt * index(y.len() - start);
-    let edges = (CYCLES / length, HIGHEST / drive.dt);
+    let edges = (CYCLES / length, HIGHEST_MODE / drive.dt);
     while found.len() < most {
         let first = found.first().map_or(0.0, |mode| mode.frequency);
         let edges = (f64::max(edges.0, SLOWEST * first), edges.1);

@@ -17,6 +17,10 @@ const LEAST_LAG: f64 = 0.05;
 /// Least phase of a lag under the drive, rad: its part of the travel.
 const LEAST_PHASE: f64 = 1e-4;
 
+/// Highest natural frequency of a mode, in cycles a sample: above half of one, the drive between the
+/// samples distinguishes it from the slower mode that rings alike at them.
+pub const HIGHEST_MODE: f64 = 0.75;
+
 /// Natural frequencies over that of a mode which the record shows: hysteresis stiffens a stage.
 const NEAR_MODE: Range = (0.6, 1.3);
 
@@ -127,19 +131,20 @@ impl Measures {
     }
 
     /// Natural frequencies at which the drive could excite a mode, rad/s: from three times the
-    /// slowest motion to nine tenths of half the sampling rate. `None` for a drive that is slow
+    /// slowest motion to [`HIGHEST_MODE`]. `None` for a drive that is slow
     /// all the time, and where the record shows no mode.
     #[must_use]
     pub fn excited(&self) -> Option<Range> {
         let slowest = 3.0 * self.slow;
-        let fastest = (0.9 * core::f64::consts::PI / self.dt).min(10.0 * self.quickness);
+        let highest = HIGHEST_MODE * core::f64::consts::TAU / self.dt;
+        let fastest = highest.min(10.0 * self.quickness);
         if self.wants_mode {
             return Some((slowest, fastest.max(8.0 * slowest)));
         }
         let quick = fastest > 8.0 * slowest && self.mode != ModeShown::Absent;
         // What may be a mode may also be what hysteresis makes of a stage far quicker.
         let faint = self.mode == ModeShown::Faint;
-        let fastest = if faint { 0.9 * core::f64::consts::PI / self.dt } else { fastest };
+        let fastest = if faint { highest } else { fastest };
         quick.then_some((slowest, fastest))
     }
 

@@ -1,7 +1,6 @@
 //! Linear dynamics as logarithms of their numbers, and weights of modes, which are found.
 
-use crate::identify::records::resonances::HIGHEST;
-use crate::models::{Dynamics, Mode};
+use crate::models::{Dynamics, HIGHEST_MODE, Mode};
 
 /// Longest lag that is searched, as a share of the record.
 const LONGEST_LAG: f64 = 0.1;
@@ -77,7 +76,7 @@ impl Form {
             Self::None => Vec::new(),
             Self::First => vec![log((SHORTEST_LAG * dt, LONGEST_LAG * length))],
             Self::Modes(count) => {
-                let mode = [log((CYCLES / length, HIGHEST / dt)), log(DAMPING)];
+                let mode = [log((CYCLES / length, HIGHEST_MODE / dt)), log(DAMPING)];
                 let further = [WEIGHT, mode[0], mode[1]].repeat(count - 1);
                 [&mode[..], &further].concat()
             }
