@@ -1,1 +1,1 @@
-"""What an identified model was fitted with, and how a record changes with it."""
+"""Values of an identified model that were fitted, and their effect on the motion of a record."""

@@ -16,10 +16,12 @@ from ..._support.two_threads import two_threads, waited_for
 from ...errors import DataError, NumericalError
 from ...stages.registry import model_named
 from ..fitted.selection import Selection, Trial
+from ..fitted.start import GAIN
 from ..methods.least_squares import LeastSquares
 from .judging import is_white, judged, noise_of, period_of, two_parts
 from .jump import rest_of
 from .one_model import identify_model, weights_of
+from .variants.creep import MOST, with_slow_parts
 from .variants.drift import turns_often, with_drifts
 from .weights import Structure
 
@@ -55,8 +57,9 @@ SEARCHED = ("first-order-dahl", "parallel-dahl", "bouc-wen")
 # Of these, one of few values predicts other motions where plays describe only the record: tried
 # where those leave more than so many times the noise.
 FEW_VALUES, MORE_THAN_NOISE = "bouc-wen", 1.02
-# What it may leave relative to a fit of many weights, each of which takes some noise away.
-AS_WELL = 1.01
+# What it may leave relative to a fit of many weights, each of which takes some noise away, and in
+# multiples of the noise where no other fit is looked for.
+AS_WELL, ONLY_NOISE = 1.01, 1.1
 # Models that contain another one, whose search costs less: tried where it is near the best.
 CONTAINED = {"parallel-dahl": "first-order-dahl"}
 NEAR_BEST = 1.5
@@ -145,6 +148,8 @@ class Tried:
     # Its structure, where least squares have found it, and its rest before a jump.
     start: Structure | None
     rest: Rest | None = None
+    # Time constants of its creep [s].
+    creep: Sequence[float] = ()
 
 
 class _Attempt(NamedTuple):
@@ -190,17 +195,55 @@ class _Trials:
             return self.least > MORE_THAN_NOISE
         return self.least >= NEAR_NOISE and self.fitted >= NOTHING_BUT_NOISE
 
-    def whole(self, problem: Problem, info: ModelInfo) -> Problem:
-        """Return the problem of a model on the whole records, with the delays that were shown."""
-        shown = self.start is not None and any(self.start.delayed)
-        return self.of_model(problem, info) if shown or info.searched else problem.of_model(info)
+    def identified(
+        self,
+        problem: Problem,
+        info: ModelInfo,
+        how: Run,
+        start: Structure | None,
+        rest: Rest | None,
+    ) -> Identification:
+        """Fit a model, by least squares from a structure, with what the first fit has shown."""
+        if info.searched:
+            return self.searched(problem, info, how, self.start, rest)
+        # The whole records may show a delay that the first parts do not.
+        first, shown = problem is self.problem, self.start
+        if shown is not None and (first or any(shown.delayed)):
+            problem = _with_delays(problem, shown)
+        of_model, method = problem.of_model(info), self.methods.method(info)
+        return identify_model(of_model, method, how, start, rest)
 
-    def of_model(self, problem: Problem, info: ModelInfo) -> Problem:
-        """Return the problem of a model, with what the first fit by least squares has shown."""
-        if self.start is None:
-            return problem.of_model(info)
-        shown = _as_shown if info.searched else _with_delays
-        return shown(problem, self.start).of_model(info)
+    def searched(
+        self,
+        problem: Problem,
+        info: ModelInfo,
+        how: Run,
+        shown: Structure | None,
+        rest: Rest | None,
+    ) -> Identification:
+        """Search a model with the slow parts that least squares have shown; Bouc-Wen with its own.
+
+        A drift or creep beside plays may stand for what the plays do not describe: Bouc-Wen has
+        them only where it leaves more without.
+        """
+        # On first parts, what is worse than least squares lacks more than a jump.
+        start = shown if problem is self.problem else None
+
+        def search(one: Problem) -> Identification:
+            return identify_model(one.of_model(info), self.methods.method(info), how, start, rest)
+
+        if shown is None:
+            return search(problem)
+        if info.name != FEW_VALUES or problem.creep is not None:
+            return search(_as_shown(problem, shown))
+        creep = next((one.creep for one in self.found if one.info is info), ())
+        own = with_slow_parts(_with_delays(problem, shown), search, creep)
+        slow = shown.creep_times or any(time is not None for time in shown.drifts)
+        if slow and own.cost > MORE_THAN_NOISE * max(own.noises):
+            with suppress(DataError, NumericalError):
+                fit = search(_as_shown(problem, shown))
+                return fit if fit.cost < (1.0 - GAIN) * own.cost else own
+        return own
 
     def of_few_values(self, best: Tried, whole: Identification) -> Tried | None:
         """Return the trial of the model of few values, where it may be better than one of many.
@@ -268,7 +311,8 @@ class _Trials:
         squares = np.array([judged(rest, one) for rest, one in pairs])
         rms = math.sqrt(float(counts @ squares) / float(counts.sum()))
         trial = Trial(info.name, info.title, rms, attempt.seconds)
-        self.found.append(Tried(trial, info, attempt.ill, start, rest_of(fit)))
+        creep = fit.model.creep_times
+        self.found.append(Tried(trial, info, attempt.ill, start, rest_of(fit), creep))
         self.fitted = min(self.fitted, fit.cost / max(min(fit.noises), 1e-300))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
         noise = np.array([noise_of(rest.measured) for rest in self.rests])
@@ -286,9 +330,8 @@ class _Trials:
     def attempt(self, info: ModelInfo, how: Run) -> _Attempt | DataError | NumericalError:
         """Fit a model to the first parts, and say what it leaves of the rests."""
         begun = time.perf_counter()
-        problem, method = self.of_model(self.problem, info), self.methods.method(info)
         try:
-            fit = identify_model(problem, method, how, self.start, self.rest)
+            fit = self.identified(self.problem, info, how, self.start, self.rest)
             left = [
                 rest.y - fit.simulate(rest, offset=record.offset).x
                 for rest, record in zip(self.rests, fit.records, strict=True)
@@ -317,22 +360,29 @@ class _OnWholes:
 
     def fit(self, best: Tried) -> Identification:
         """Fit the best model, or another one that leaves far less on the whole records."""
-        found = _Whole(best, self.fitted(best, best.start, best.rest))
+        found = whole = _Whole(best, self.fitted(best, best.start, best.rest))
+        noises, left, few = max(whole.fit.noises), whole.fit.cost, None
+        if left < NEAR_NOISE * noises:
+            few = self.of_few_values(whole)
+            if few is not None and few.cost <= min(ONLY_NOISE * noises, AS_WELL * left):
+                return few
         noise = max(noise_of(record.data) for record in self.problem.records)
         if best.info.name == MANY_WEIGHTS or found.fit.cost > NOTHING_BUT_NOISE * noise:
             found = self.least(found)
         # The structure of the first part is that of the whole where nothing but noise is left.
         if found.fit.cost >= NOTHING_BUT_NOISE * min(found.fit.noises):
             found = self.anew(found)
-        return self.of_few_values(found)
+        if few is None or _begun(found.fit) != _begun(whole.fit):
+            few = self.of_few_values(found)
+        explains = few is not None and few.cost < AS_WELL * found.fit.cost
+        return few if few is not None and explains else found.fit
 
     def fitted(
         self, one: Tried, start: Structure | None = None, rest: Rest | None = None
     ) -> Identification:
         """Fit a model, from a structure or anew."""
         kept = None if start is None else replace(start, kept=True)
-        of_model = self.trials.whole(self.problem, one.info)
-        return identify_model(of_model, self.methods.method(one.info), self.how, kept, rest)
+        return self.trials.identified(self.problem, one.info, self.how, kept, rest)
 
     def least(self, found: _Whole, shown: Structure | None = None) -> _Whole:
         """Return what was found, or another model that leaves far less.
@@ -362,18 +412,20 @@ class _OnWholes:
                     return self.least(found, shown)
         return found
 
-    def of_few_values(self, found: _Whole) -> Identification:
-        """Return what was found, or a fit of few values that explains as much: it predicts more."""
+    def of_few_values(self, found: _Whole) -> Identification | None:
+        """Fit the model of few values, where it may explain as much: it predicts more."""
         best, fit = found
         few = self.trials.of_few_values(best, fit)
         if few is not None and fit.cost > MORE_THAN_NOISE * min(fit.noises):
             with suppress(DataError, NumericalError):
-                problem = _as_shown(self.problem, Structure.of(fit)).of_model(few.info)
-                method = self.methods.method(few.info)
-                other = identify_model(problem, method, self.how, rest=rest_of(fit))
-                if other.cost < AS_WELL * fit.cost:
-                    return other
-        return fit
+                shown, rest = Structure.of(fit), rest_of(fit)
+                return self.trials.searched(self.problem, few.info, self.how, shown, rest)
+        return None
+
+
+def _begun(fit: Identification) -> tuple[list[bool], Rest | None]:
+    """Return which records are read late, and the rest before a jump."""
+    return [one.delay != 0.0 for one in fit.records], rest_of(fit)
 
 
 def _with_delays(problem: Problem, start: Structure) -> Problem:
@@ -388,9 +440,15 @@ def _with_delays(problem: Problem, start: Structure) -> Problem:
 def _as_shown(problem: Problem, start: Structure) -> Problem:
     """Return a problem with the creep, drifts and delays of a fit where none are given."""
     if problem.creep is None and start.creep_times:
-        problem = replace(problem, creep=tuple(start.creep_times))
+        problem = replace(problem, creep=_few(start.creep_times))
     drifting = with_drifts(problem, [time is not None for time in start.drifts])
     return _with_delays(drifting, start)
+
+
+def _few(times: Sequence[float]) -> tuple[float, ...]:
+    """Return as many time constants as a search has, from the shortest to the longest."""
+    places = np.linspace(0, len(times) - 1, min(len(times), MOST))
+    return tuple(times[round(place)] for place in places)
 
 
 def best_of(tried: Sequence[Tried], better: float = BETTER) -> Tried:

@@ -1,0 +1,166 @@
+"""Time constants of the creep of a model that is searched, which its residual shows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ....errors import DataError, NumericalError
+from ...fitted.start import start_after, start_at_jump
+from ...linearised.sensitivity import LinearisedRecord
+from ...linearised.values import fitted_values, without_search
+from .drift import with_drift_of_few_turns, with_drift_tried
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from ...fitted.identification import Identification
+    from ...fitted.identified_model import IdentifiedModel
+    from ...problem.problem import Problem
+
+    Array = NDArray[np.float64]
+
+__all__ = ["MOST", "with_slow_parts"]
+
+# A residual of so many times the noise has hardly anything but noise in it.
+NOISY = 1.05
+# Share of the residual that each relaxation has to take away, and of the cost that a search has to.
+GAIN = 0.1
+# Relaxations of a search, at most, least ratio of their time constants, and that of those tried.
+MOST, APART, STEP = 3, 3.0, 1.15
+# Shortest time constant tried, in samples.
+SHORTEST = 5.0
+# Searches, each with the time constants that the residual of the one before shows, at most.
+ROUNDS = 3
+
+
+def with_slow_parts(
+    problem: Problem,
+    search: Callable[[Problem], Identification],
+    begun: Sequence[float] = (),
+) -> Identification:
+    """Search with the creep that a residual shows, then with a drift where one is left.
+
+    The record is linearised about a fit: of the relaxations of its motion, those are taken that
+    lower the residual most beside changes of the values that were fitted: a search may have taken a
+    part of the creep for them.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem, without creep. Of several records none is tried.
+    search : callable
+        What solves a problem.
+    begun : sequence of float, optional
+        Time constants of the creep to begin with [s].
+
+    Returns
+    -------
+    Identification
+        The result: with creep where that lowers the cost by 10 %, with a drift as
+        `with_drift_tried`.
+
+    Raises
+    ------
+    ParameterError, DataError, NumericalError, Interrupted
+        As for `identify`.
+    """
+    records = tuple(
+        replace(record, drift=False) if record.drift is None else record
+        for record in problem.records
+    )
+    fit = _with_creep_tried(replace(problem, records=records), search, tuple(begun))
+    creeping = replace(problem, creep=fit.model.creep_times or None)
+    return with_drift_of_few_turns(creeping, with_drift_tried(creeping, fit, search), search)
+
+
+def _with_creep_tried(
+    problem: Problem, search: Callable[[Problem], Identification], begun: tuple[float, ...]
+) -> Identification:
+    """Search without creep or with some, then with what the residual of the search before shows."""
+    fit = search(replace(problem, creep=begun or None))
+    if len(problem.records) > 1:
+        return fit
+    for _ in range(ROUNDS):
+        if fit.cost <= NOISY * max(fit.noises):
+            break
+        times = _times_shown(fit)
+        if not times or _alike(times, fit.model.creep_times):
+            break
+        try:
+            other = search(replace(problem, creep=times))
+        except (DataError, NumericalError):
+            break
+        if other.cost >= (1.0 - GAIN) * fit.cost:
+            break
+        fit = other
+    return fit
+
+
+def _alike(times: tuple[float, ...], others: tuple[float, ...]) -> bool:
+    """Return whether time constants differ by less than those that are tried."""
+    if len(times) != len(others):
+        return False
+    pairs = zip(times, others, strict=True)
+    return all(abs(math.log(one / other)) < math.log(STEP) for one, other in pairs)
+
+
+def _times_shown(fit: Identification) -> tuple[float, ...]:
+    """Return the time constants of the relaxations that lower a residual most [s], or none."""
+    data = fit.data
+    still = _with_creep(fit)
+    record = LinearisedRecord(still, data)
+    columns = [*record.columns(still, fitted_values(still)), *record.nuisance().values()]
+    motion = record.begun(still)
+    window = float(data.t[-1] - data.t[0])
+    count = math.ceil(math.log(window / (SHORTEST * data.dt)) / math.log(STEP))
+    times = np.geomspace(SHORTEST * data.dt, window, max(count, 2)).tolist()
+    relaxed = {time: record.begun(_with_creep(fit, time)) - motion for time in times}
+    found: list[float] = []
+    left = _left(record.residual, columns, [])
+    while len(found) < MOST:
+        others = [time for time in times if all(_apart(time, one) for one in found)]
+        costs = {
+            time: _left(record.residual, columns, [relaxed[one] for one in (*found, time)])
+            for time in others
+        }
+        best = min(others, key=costs.__getitem__, default=None)
+        if best is None or not costs[best] < (1.0 - GAIN) * left:
+            break
+        left = costs[best]
+        found.append(best)
+    return tuple(sorted(found))
+
+
+def _apart(time: float, other: float) -> bool:
+    return abs(math.log(time / other)) >= math.log(APART)
+
+
+def _left(residual: Array, columns: list[Array], relaxed: list[Array]) -> float:
+    """Return what least squares leave of a residual [m]; infinite where a weight is below 0."""
+    matrix = np.column_stack([*columns, *relaxed])
+    matrix = matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+    weights = np.linalg.lstsq(matrix, residual, rcond=1e-10)[0]
+    if np.any(weights[len(columns) :] < 0.0):
+        return math.inf
+    return float(np.sqrt(np.mean((residual - matrix @ weights) ** 2)))
+
+
+def _with_creep(fit: Identification, *times: float) -> IdentifiedModel:
+    """Return the model of a fit with one relaxation of weight 1 for each time, beside no other."""
+    creep: dict[str, Any] = {"creep_weights": (1.0,) * len(times), "creep_times": times}
+    model: Any = replace(fit.model, **creep)
+    data, start = fit.data, fit.start
+    if start is None:
+        return replace(without_search(fit), model=model)
+    if start.rest is not None:
+        begun = start_at_jump(model, data, start.rest)
+    else:
+        begun = start_after(model, data, start.history, start.voltage, creeps=False)
+    records = tuple(replace(one, start=begun) for one in fit.records)
+    return replace(without_search(fit), model=model, start=begun, records=records)
