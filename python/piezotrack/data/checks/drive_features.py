@@ -134,6 +134,11 @@ class DriveFeatures:
     steps: bool
     mode_limit: float
 
+    @property
+    def has_one_amplitude(self) -> bool:
+        """Whether all changes between two reversals are alike."""
+        return bool(self.swings) and self.swings[0] >= (1.0 - 2.0 * SAME) * self.swings[1]
+
 
 def time_features(t: Array) -> TimeFeatures:
     """Describe the times of the samples.
@@ -346,7 +351,7 @@ def _of_reversals(drive: DriveFeatures) -> Determination:
 
 def _of_amplitudes(drive: DriveFeatures) -> list[Determination]:
     least, most = drive.swings
-    if least >= (1.0 - 2.0 * SAME) * most:
+    if drive.has_one_amplitude:
         words = f"one amplitude, {_drive(most, drive)}: minor loops are extrapolated from it"
         return [Determination("minor loops", "no", words)]
     between = f"amplitudes from {_drive(least, drive)} to {_drive(most, drive)}"

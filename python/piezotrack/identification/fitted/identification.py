@@ -14,13 +14,22 @@ from ..._support.display.result import Panel
 from ..._support.statistics import sample_noise
 from ...data.checks import diagnostics
 from ...data.checks.connections import unusual_connection
+from ...data.checks.drive_features import drive_features
 from ...data.checks.hum import hum_lines, hum_notes, power_of
 from ...data.checks.record_flags import record_warnings
 from ..methods.descents import Descents
 from ..methods.particle_swarm import ParticleSwarm
 from .fitted_record import FittedRecord
 from .identified_model import IdentifiedModel
-from .notes import above_noise, deviation_of, drift_notes, first_samples, fit_percent, lag_notes
+from .notes import (
+    above_noise,
+    amplitude_notes,
+    deviation_of,
+    drift_notes,
+    first_samples,
+    fit_percent,
+    lag_notes,
+)
 
 if TYPE_CHECKING:
     import datetime
@@ -225,6 +234,9 @@ class Identification(IdentifiedModel):
         if self.lags is not None and (self.lags.from_zero or max(rates) < OTHER * min(rates)):
             lag = getattr(self.model, "time_constant", None)
             notes += lag_notes(self.lags, 2.0 * math.pi * rates[0], lag)
+        if not info.searched:
+            drives = (drive_features(data.t, data.u, None, unit) for data, _ in self._fitted)
+            notes += amplitude_notes(list(drives))
         if self.at_bound:
             notes.append(
                 "the record does not determine the dynamics: time constant or mode lies on a bound"

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ...data.checks.drive_features import DriveFeatures
     from ...data.dataset import Dataset
     from .drift import Drift
     from .estimates import LagRange
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "above_noise",
+    "amplitude_notes",
     "deviation_of",
     "drift_notes",
     "drive_rate",
@@ -37,6 +39,8 @@ __all__ = [
 NOISY = 3.0
 # Share of the travel that a lag makes up from which a loop is due to it.
 VISCOUS = 0.02
+# Ratio of amplitudes of several records from which they are one.
+ALIKE = 0.95
 # Share of the stroke from which a drift is too large for that of a sensor.
 LARGE = 0.05
 # Share of the window that the first samples may be, and of the squared residual that they carry.
@@ -117,6 +121,29 @@ all of the motion']
     return [
         f"the residual is {cost / noise:.2g} times the noise between samples, "
         f"{1e9 * noise:.3g} nm: no model that was tried describes all of the motion"
+    ]
+
+
+def amplitude_notes(drives: Sequence[DriveFeatures]) -> list[str]:
+    """Say that the drives of all records have one and the same amplitude.
+
+    Parameters
+    ----------
+    drives : sequence of DriveFeatures
+        The drives.
+
+    Returns
+    -------
+    list of str
+        One sentence, or none.
+    """
+    spans = [swing for drive in drives for swing in drive.swings]
+    if not all(drive.has_one_amplitude for drive in drives) or min(spans) < ALIKE * max(spans):
+        return []
+    swing = drive_text(max(spans), drives[0].unit)
+    return [
+        f"the drive has one amplitude, {swing}: the record does not determine smaller loops, which "
+        "the model extrapolates"
     ]
 
 
