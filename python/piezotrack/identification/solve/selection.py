@@ -148,8 +148,9 @@ class Tried:
     # Its structure, where least squares have found it, and its rest before a jump.
     start: Structure | None
     rest: Rest | None = None
-    # Time constants of its creep [s].
+    # Time constants of its creep [s], and what it leaves of what was fitted [m].
     creep: Sequence[float] = ()
+    cost: float = math.inf
 
 
 class _Attempt(NamedTuple):
@@ -248,17 +249,17 @@ class _Trials:
     def of_few_values(self, best: Tried, whole: Identification) -> Tried | None:
         """Return the trial of the model of few values, where it may be better than one of many.
 
-        It is near the best one, or was judged with a drift in what was not fitted, or a drift may
-        be in what was, of which least squares find none.
+        It is near the best one, or leaves as little of what was fitted, or was judged with a drift
+        in what was not fitted, or a drift may be in what was, of which least squares find none.
         """
-        if best.start is None or self.least <= MORE_THAN_NOISE:
+        few = next((one for one in self.found if one.info.name == FEW_VALUES), None)
+        if few is None or best.start is None or self.least <= MORE_THAN_NOISE:
             return None
         pairs = zip(whole.records, best.start.drifts, strict=True)
         drifts = any(record.drift and not before for record, before in pairs)
         drifts = drifts or not all(turns_often(record) for record in self.problem.records)
-        if not drifts and not self.near_best(FEW_VALUES):
-            return None
-        return next((one for one in self.found if one.info.name == FEW_VALUES), None)
+        near = self.near_best(FEW_VALUES) or few.cost < AS_WELL * best.cost
+        return few if near or drifts else None
 
     def others(self, best: Tried) -> list[Tried]:
         """Return the models that are fitted to the whole records beside the best one."""
@@ -311,8 +312,8 @@ class _Trials:
         squares = np.array([judged(rest, one) for rest, one in pairs])
         rms = math.sqrt(float(counts @ squares) / float(counts.sum()))
         trial = Trial(info.name, info.title, rms, attempt.seconds)
-        creep = fit.model.creep_times
-        self.found.append(Tried(trial, info, attempt.ill, start, rest_of(fit), creep))
+        creep, cost = fit.model.creep_times, fit.cost
+        self.found.append(Tried(trial, info, attempt.ill, start, rest_of(fit), creep, cost))
         self.fitted = min(self.fitted, fit.cost / max(min(fit.noises), 1e-300))
         # Of a quick motion, differences from sample to sample are not the noise's alone.
         noise = np.array([noise_of(rest.measured) for rest in self.rests])

@@ -29,8 +29,9 @@ __all__ = ["MOST", "with_slow_parts"]
 
 # A residual of so many times the noise has hardly anything but noise in it.
 NOISY = 1.05
-# Share of the residual that each relaxation has to take away, and of the cost that a search has to.
-GAIN = 0.1
+# Share of the residual that each relaxation has to take away, and of the cost that a search has to:
+# so much of all, or of what is above the noise.
+GAIN, GAIN_ABOVE = 0.1, 0.3
 # Relaxations of a search, at most, least ratio of their time constants, and that of those tried.
 MOST, APART, STEP = 3, 3.0, 1.15
 # Shortest time constant tried, in samples.
@@ -62,8 +63,8 @@ def with_slow_parts(
     Returns
     -------
     Identification
-        The result: with creep where that lowers the cost by 10 %, with a drift as
-        `with_drift_tried`.
+        The result: with creep where that lowers the cost by 10 %, or by 30 % of what is above the
+        noise; with a drift as `with_drift_tried`.
 
     Raises
     ------
@@ -96,10 +97,15 @@ def _with_creep_tried(
             other = search(replace(problem, creep=times))
         except (DataError, NumericalError):
             break
-        if other.cost >= (1.0 - GAIN) * fit.cost:
+        if not other.cost < _less(fit.cost, max(fit.noises)):
             break
         fit = other
     return fit
+
+
+def _less(left: float, noise: float) -> float:
+    """Return the residual below which something is better that leaves more than noise [m]."""
+    return left - min(GAIN * left, GAIN_ABOVE * (left - noise))
 
 
 def _alike(times: tuple[float, ...], others: tuple[float, ...]) -> bool:
@@ -130,7 +136,7 @@ def _times_shown(fit: Identification) -> tuple[float, ...]:
             for time in others
         }
         best = min(others, key=costs.__getitem__, default=None)
-        if best is None or not costs[best] < (1.0 - GAIN) * left:
+        if best is None or not costs[best] < _less(left, max(fit.noises)):
             break
         left = costs[best]
         found.append(best)
