@@ -12,8 +12,8 @@ import pytest
 
 import piezotrack as pt
 from folders import ROOT
-from piezotrack.identification.solve import selection
 from piezotrack.identification.solve.one_model import identify_model
+from piezotrack.identification.solve.selecting import trials
 
 BENCH = ROOT / "benches" / "records" / "choices.py"
 
@@ -105,7 +105,7 @@ def test_a_model_that_fits_the_whole_record_far_better_is_taken(
             raise pt.NumericalError("no candidate could be simulated")
         return identify_model(problem, *arguments, **more)
 
-    monkeypatch.setattr(selection, "identify_model", refused)
+    monkeypatch.setattr(trials, "identify_model", refused)
     assert pt.identify(data).model.info.name == best
 
 

@@ -13,8 +13,8 @@ import piezotrack as pt
 from piezotrack._support.statistics import sample_noise
 from piezotrack.benchmarking.records.made_up import RECORDS
 from piezotrack.identification.fitted.selection import Trial
-from piezotrack.identification.solve import selection
 from piezotrack.identification.solve.one_model import identify_model
+from piezotrack.identification.solve.selecting import trials
 from records import selection_of
 
 DT = 1e-3
@@ -101,8 +101,8 @@ def test_ctrl_c_ends_trials_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(selection, "identify_model", until_stopped)
-    monkeypatch.setattr(selection, "waited_for", interrupt)
+    monkeypatch.setattr(trials, "identify_model", until_stopped)
+    monkeypatch.setattr(trials, "waited_for", interrupt)
     with pytest.raises(pt.Interrupted, match="before the weights were found"):
         pt.identify(record(SMOOTH, 2e-9))
     waited = time.monotonic()
@@ -115,10 +115,10 @@ def test_ctrl_c_ends_trials_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_smooth_tips_are_told_from_plays(tmp_path: Path) -> None:
     fit = pt.identify(record(SMOOTH, 1e-9), method=pt.Descents(seed=1, runs=2), progress=False)
     assert fit.model.info.name in ("first-order-dahl", "parallel-dahl")
-    trials = selection_of(fit).trials
-    assert trials[0].model == fit.model.info.name
-    assert trials[0].rms < 0.5 * next(
-        trial.rms for trial in trials if trial.model == "prandtl-ishlinskii"
+    found = selection_of(fit).trials
+    assert found[0].model == fit.model.info.name
+    assert found[0].rms < 0.5 * next(
+        trial.rms for trial in found if trial.model == "prandtl-ishlinskii"
     )
     document = json.loads(fit.save(tmp_path / "model.json").read_text(encoding="utf-8"))
     assert document["selection"]["models"].keys() == set(tried(fit))

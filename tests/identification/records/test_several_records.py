@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
-from piezotrack.identification.solve import selection
+from piezotrack.identification.solve.selecting import selection
 from records import search_of, selection_of
 from reference import multisine
 

@@ -198,7 +198,7 @@ def _files(
 ) -> Iterator[str]:
     """Names of all files that the command may write."""
     from ..._support.files.writing import picture_files
-    from ...identification.solve.selection import models_tried
+    from ...identification.solve.selecting.selection import models_tried
     from ...identification.views.files import identification_files
 
     names = [name for name in kinds.names if name != AUTO]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..problem.problem import AUTO
 from .one_model import identify_model
-from .selection import identify_best
+from .selecting.selection import identify_best
 from .variants.between_samples import with_interpolation_tried
 
 if TYPE_CHECKING:

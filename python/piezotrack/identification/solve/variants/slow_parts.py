@@ -1,4 +1,4 @@
-"""Time constants of the creep of a model that is searched, which its residual shows."""
+"""Creep of a model that is searched, which its residual shows, and a drift beside it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["MOST", "with_slow_parts"]
+__all__ = ["MOST", "NOISY", "with_slow_parts"]
 
 # A residual of so many times the noise has hardly anything but noise in it.
 NOISY = 1.05
@@ -38,6 +38,8 @@ MOST, APART, STEP = 3, 3.0, 1.15
 SHORTEST = 5.0
 # Searches, each with the time constants that the residual of the one before shows, at most.
 ROUNDS = 3
+# Rows on which relaxations are compared, about.
+ROWS = 5000
 
 
 def with_slow_parts(
@@ -121,18 +123,20 @@ def _times_shown(fit: Identification) -> tuple[float, ...]:
     data = fit.data
     still = _with_creep(fit)
     record = LinearisedRecord(still, data)
+    some = slice(None, None, -(-record.residual.size // ROWS))
     columns = [*record.columns(still, fitted_values(still)), *record.nuisance().values()]
-    motion = record.begun(still)
+    columns = [column[some] for column in columns]
+    residual, motion = record.residual[some], record.begun(still)[some]
     window = float(data.t[-1] - data.t[0])
     count = math.ceil(math.log(window / (SHORTEST * data.dt)) / math.log(STEP))
     times = np.geomspace(SHORTEST * data.dt, window, max(count, 2)).tolist()
-    relaxed = {time: record.begun(_with_creep(fit, time)) - motion for time in times}
+    relaxed = {time: record.begun(_with_creep(fit, time))[some] - motion for time in times}
     found: list[float] = []
-    left = _left(record.residual, columns, [])
+    left = _left(residual, columns, [])
     while len(found) < MOST:
         others = [time for time in times if all(_apart(time, one) for one in found)]
         costs = {
-            time: _left(record.residual, columns, [relaxed[one] for one in (*found, time)])
+            time: _left(residual, columns, [relaxed[one] for one in (*found, time)])
             for time in others
         }
         best = min(others, key=costs.__getitem__, default=None)

@@ -1,0 +1,115 @@
+"""Fits to whole records, of which the first parts do not show all."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+from ....errors import DataError, NumericalError
+from ..judging import noise_of
+from ..jump import rest_of
+from ..weights import Structure
+from .trials import AS_WELL, MANY_WEIGHTS, MORE_THAN_NOISE, NEAR_NOISE, NOTHING_BUT_NOISE
+
+if TYPE_CHECKING:
+    from ...fitted.identification import Identification
+    from ...fitted.start import Rest
+    from ...methods.choice import MethodChoice
+    from ...problem.problem import Problem
+    from ..run import Run
+    from .trials import Trials, Tried
+
+__all__ = ["OnWholes"]
+
+# What a fit of few values leaves, in multiples of the noise, where no other one is looked for.
+ONLY_NOISE = 1.1
+# A fit that leaves more than noise gives way to another one that leaves less by this share; one of
+# many weights has to leave less than others by it.
+BETTER_ON_WHOLE = 0.25
+
+
+class _Whole(NamedTuple):
+    """A model, and its fit to whole records."""
+
+    best: Tried
+    fit: Identification
+
+
+@dataclass(frozen=True)
+class OnWholes:
+    """Fits to whole records, of which the first parts do not show all."""
+
+    problem: Problem
+    methods: MethodChoice
+    how: Run
+    trials: Trials
+
+    def fit(self, best: Tried) -> Identification:
+        """Fit the best model, or another one that leaves far less on the whole records."""
+        found = whole = _Whole(best, self.fitted(best, best.start, best.rest))
+        noises, left, few = max(whole.fit.noises), whole.fit.cost, None
+        if left < NEAR_NOISE * noises:
+            few = self.of_few_values(whole)
+            if few is not None and few.cost <= min(ONLY_NOISE * noises, AS_WELL * left):
+                return few
+        noise = max(noise_of(record.data) for record in self.problem.records)
+        if best.info.name == MANY_WEIGHTS or found.fit.cost > NOTHING_BUT_NOISE * noise:
+            found = self.least(found)
+        # The structure of the first part is that of the whole where nothing but noise is left.
+        if found.fit.cost >= NOTHING_BUT_NOISE * min(found.fit.noises):
+            found = self.anew(found)
+        if few is None or _begun(found.fit) != _begun(whole.fit):
+            few = self.of_few_values(found)
+        explains = few is not None and few.cost < AS_WELL * found.fit.cost
+        return few if few is not None and explains else found.fit
+
+    def fitted(
+        self, one: Tried, start: Structure | None = None, rest: Rest | None = None
+    ) -> Identification:
+        """Fit a model, from a structure or anew."""
+        kept = None if start is None else replace(start, kept=True)
+        return self.trials.identified(self.problem, one.info, self.how, kept, rest)
+
+    def least(self, found: _Whole, shown: Structure | None = None) -> _Whole:
+        """Return what was found, or another model that leaves far less.
+
+        Others begin with the structures of their first parts, or with what the whole has shown.
+        """
+        (best, fit), share = found, 1.0 - BETTER_ON_WHOLE
+        enough = fit.cost / share if best.info.name == MANY_WEIGHTS else share * fit.cost
+        for one in self.trials.others(best):
+            with suppress(DataError, NumericalError):
+                start, rest = (shown, rest_of(fit)) if shown else (one.start, one.rest)
+                if (other := self.fitted(one, start, rest)).cost < enough:
+                    found, enough = _Whole(one, other), other.cost
+        return found
+
+    def anew(self, found: _Whole) -> _Whole:
+        """Fit the best model of many weights anew, and others where it shows further dynamics."""
+        best, fit = found
+        one = next((one for one in [best, *self.trials.others(best)] if one.start), None)
+        if one is None or one.start is None or not self.methods.weights._resumes:
+            return found
+        with suppress(DataError, NumericalError):
+            anew = self.fitted(one)
+            if anew.cost < (1.0 if one is best else 1.0 - BETTER_ON_WHOLE) * fit.cost:
+                found, shown = _Whole(one, anew), Structure.of(anew)
+                if len(shown.dynamics) > len(one.start.dynamics):
+                    return self.least(found, shown)
+        return found
+
+    def of_few_values(self, found: _Whole) -> Identification | None:
+        """Fit the model of few values, where it may explain as much: it predicts more."""
+        best, fit = found
+        few = self.trials.of_few_values(best, fit)
+        if few is not None and fit.cost > MORE_THAN_NOISE * min(fit.noises):
+            with suppress(DataError, NumericalError):
+                shown, rest = Structure.of(fit), rest_of(fit)
+                return self.trials.searched(self.problem, few.info, self.how, shown, rest)
+        return None
+
+
+def _begun(fit: Identification) -> tuple[list[bool], Rest | None]:
+    """Return which records are read late, and the rest before a jump."""
+    return [one.delay != 0.0 for one in fit.records], rest_of(fit)
