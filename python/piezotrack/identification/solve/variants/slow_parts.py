@@ -92,10 +92,10 @@ def _with_creep_tried(
     for _ in range(ROUNDS):
         if fit.cost <= NOISY * max(fit.noises):
             break
-        times = _times_shown(fit)
-        if not times or _alike(times, fit.model.creep_times):
-            break
         try:
+            times = _times_shown(fit)
+            if not times or _alike(times, fit.model.creep_times):
+                break
             other = search(replace(problem, creep=times))
         except (DataError, NumericalError):
             break
