@@ -13,8 +13,12 @@ import piezotrack as pt
 from piezotrack._support.statistics import sample_noise
 from piezotrack.benchmarking.records.made_up import RECORDS
 from piezotrack.identification.fitted.selection import Trial
+from piezotrack.identification.problem.problem import Problem
+from piezotrack.identification.problem.records import records_of
 from piezotrack.identification.solve.one_model import identify_model
 from piezotrack.identification.solve.selecting import trials
+from piezotrack.identification.solve.selecting.shown import as_shown
+from piezotrack.identification.solve.weights import Structure
 from records import selection_of
 
 DT = 1e-3
@@ -163,6 +167,19 @@ def test_the_swing_of_a_mode_does_not_hide_what_is_left() -> None:
         fit, selection=pt.identification.Selection(trials=(trial,), fitted_until=1.0)
     )
     assert any("times the noise between samples" in note for note in chosen.notes)
+
+
+def test_a_search_takes_three_of_the_time_constants_that_plays_have_shown() -> None:
+    times = [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0]
+    shown = Structure(["virgin"], [None], [False], times, [])
+    log = record(PLAYS, 1e-9)
+    records = records_of(log, offset=True, delay=None, drift=None, history=None)
+    problem = as_shown(Problem.checked("bouc-wen", records, None, None, None), shown)
+    assert problem.creep == (0.01, 1.0, 1000.0)
+    # As many as a search accepts.
+    assert pt.identification.Objective(log, "bouc-wen", creep=problem.creep).ranges
+    with pytest.raises(pt.ParameterError, match="3 time constants at most"):
+        pt.identification.Objective(log, "bouc-wen", creep=times)
 
 
 def test_parameters_need_a_named_model() -> None:
