@@ -101,6 +101,17 @@ def test_a_new_cycle_is_within_the_quantile(parts: int, unequal: float) -> None:
     assert np.mean(within) < 0.94
 
 
+def test_a_drift_that_is_over_in_one_cycle_is_not_unlimited_there() -> None:
+    # Of its size, 50 nm, the cycles after the first show nothing.
+    t = DT * np.arange(1000)
+    u = 35.0 - 35.0 * np.cos(2.0 * np.pi * t)
+    noise = NOISE * np.random.default_rng(1).standard_normal(u.size)
+    y = STAGE.simulate(u, DT).x + 5e-8 * np.exp(-t / 0.15) + noise
+    fit = pt.identify(pt.Dataset(u=u, y=y, dt=DT), "prandtl-ishlinskii", method=PLAYS, drift=0.15)
+    assert fit.covariance is not None
+    assert 1.96 * NOISE < fit.covariance.predicted < 3.0 * NOISE
+
+
 def test_an_exact_model_has_the_noise_alone() -> None:
     band = fitted().prediction_band(record(2))
     assert float(np.median(band.noise)) == pytest.approx(1.96 * NOISE, rel=0.3)

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ...data.dataset import Dataset
-    from ..fitted.drift import Drift
     from ..fitted.estimates import Estimate
     from ..fitted.identification import Identification
     from ..fitted.identified_model import IdentifiedModel
@@ -146,7 +145,7 @@ def _of_each_record(
         return known
     values = fitted_values(fit)
     rows = [(r, name) for r, one in enumerate(linear) for name in one.alone if name in free[r]]
-    of_rows = [_size_alone(fit.records[r].drift, name) for r, name in rows]
+    of_rows = [linear[r].sizes[linear[r].alone.index(name)] or 1.0 for r, name in rows]
     sizes = np.append(sizes_of(fit, values, records[0][0].dt), of_rows)
     extended = [
         _Linear(_with_rows(one, r, rows), data, weight, sizes)
@@ -172,23 +171,17 @@ def _of_each_record(
     return known
 
 
-def _size_alone(drift: Drift | None, name: str) -> float:
-    """Size of what belongs to a record alone, 1 of its unit where it is not that of a drift."""
-    if drift is None:
-        return 1.0
-    return {"drift": abs(drift.amplitude), "drift_time": drift.time}.get(name, 1.0) or 1.0
-
-
 def _with_rows(linear: Sensitivity, record: int, rows: list[tuple[int, str]]) -> Sensitivity:
     """Take what belongs to records alone for values, 0 in the other records."""
-    mine = dict(zip(linear.alone, linear.nuisance, strict=True))
+    mine = dict(zip(linear.alone, zip(linear.nuisance, linear.sizes, strict=True), strict=True))
     none = np.zeros(linear.residual.size)
-    added = [mine.pop(name) if r == record else none for r, name in rows]
+    added = [mine.pop(name)[0] if r == record else none for r, name in rows]
     return replace(
         linear,
         columns=np.concatenate([linear.columns, added]),
-        nuisance=np.array(list(mine.values())).reshape(-1, none.size),
+        nuisance=np.array([column for column, _ in mine.values()]).reshape(-1, none.size),
         alone=tuple(mine),
+        sizes=np.array([size for _, size in mine.values()]),
     )
 
 

@@ -229,6 +229,7 @@ class _Record:
         lengths = np.linalg.norm(linear.nuisance, axis=1, keepdims=True)
         self.columns = math.sqrt(weight) * (linear.columns * sizes[:, None]).T
         self.nuisance = (linear.nuisance / np.where(lengths > 0.0, lengths, 1.0)).T
+        self.sizes = linear.sizes * lengths[:, 0]
         self.weight = weight
 
 
@@ -245,12 +246,18 @@ class _Normal:
             if one.fitted:
                 places, columns = self._of(i)
                 self.products[np.ix_(places, places)] += columns.T @ columns
-        # A value is known to within its own size, however little a cycle says of it.
+        # A value is known to within its own size, however little a cycle says of it, as is what
+        # belongs to a record: a drift that is over in one cycle would be unlimited there.
         squares = [float(np.mean(one.error**2)) for one in fitted]
         ridge = np.full(self.products.shape[0], 1e-12)
         # Of a record without noise, not below what rounding leaves of the products.
         size = self.products.shape[0] * float(np.max(np.diagonal(self.products), initial=0.0))
-        ridge[:count] = max([*squares, np.finfo(np.float64).eps * size])
+        least = max([*squares, np.finfo(np.float64).eps * size])
+        ridge[:count] = least
+        for first, one in zip(self.first, records, strict=False):
+            if one.fitted:
+                own = slice(first, first + one.sizes.size)
+                ridge[own] += one.weight * least / np.maximum(one.sizes, 1e-300) ** 2
         self.products += np.diag(ridge)
 
     def _of(self, i: int) -> tuple[Places, Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +47,8 @@ class Sensitivity:
     alone : tuple of str
         What belongs to the record alone: ``"offset"``, ``"drift"``, ``"drift_time"``,
         ``"voltage_before"``, and of one of several records its ``"delay"``.
+    sizes : ndarray, shape (q,)
+        Sizes of these, in their units; infinite for an offset.
     residual : ndarray, shape (n,)
         Measured less simulated displacement [m].
     """
@@ -53,6 +56,7 @@ class Sensitivity:
     columns: Array
     nuisance: Array
     alone: tuple[str, ...]
+    sizes: Array
     residual: Array
 
 
@@ -103,6 +107,7 @@ def sensitivity(model: IdentifiedModel, data: Dataset, values: list[Value]) -> S
         columns=record.columns(model, values),
         nuisance=np.array(list(nuisance.values())).reshape(-1, count),
         alone=tuple(nuisance),
+        sizes=np.array([record.size_of(name) for name in nuisance]),
         residual=record.residual,
     )
 
@@ -235,6 +240,17 @@ class LinearisedRecord:
         if several and "delay" in self.record.parameters:
             columns["delay"] = self._delayed()
         return columns
+
+    def size_of(self, alone: str) -> float:
+        """Size of what belongs to the record alone; infinite for an offset."""
+        drift = self.record.drift
+        sizes = {
+            "drift": abs(drift.amplitude) if drift else 0.0,
+            "drift_time": drift.time if drift else 0.0,
+            "voltage_before": float(np.ptp(self.data.full.u)),
+            "delay": max(abs(self.model._delay_on(self.data)), self.data.dt),
+        }
+        return sizes.get(alone, math.inf)
 
     def _delayed(self) -> Array:
         """Change with the delay of one of several records [m/s]."""
