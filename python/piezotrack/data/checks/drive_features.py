@@ -25,6 +25,7 @@ __all__ = [
     "TimeFeatures",
     "determinations",
     "drive_features",
+    "has_one_amplitude",
     "reversals_text",
     "time_features",
 ]
@@ -133,11 +134,6 @@ class DriveFeatures:
     rests: tuple[tuple[float, float, float], ...]
     steps: bool
     mode_limit: float
-
-    @property
-    def has_one_amplitude(self) -> bool:
-        """Whether all changes between two reversals are alike."""
-        return bool(self.swings) and self.swings[0] >= (1.0 - 2.0 * SAME) * self.swings[1]
 
 
 def time_features(t: Array) -> TimeFeatures:
@@ -315,6 +311,22 @@ def determinations(
     ]
 
 
+def has_one_amplitude(drive: DriveFeatures) -> bool:
+    """Return whether all changes between two reversals are alike.
+
+    Parameters
+    ----------
+    drive : DriveFeatures
+        The drive.
+
+    Returns
+    -------
+    bool
+        False without two reversals.
+    """
+    return bool(drive.swings) and drive.swings[0] >= (1.0 - 2.0 * SAME) * drive.swings[1]
+
+
 def _of_time(time: TimeFeatures) -> list[Determination]:
     if time.backward:
         words = f"the time does not increase at {time.backward} samples: no model before it does"
@@ -351,7 +363,7 @@ def _of_reversals(drive: DriveFeatures) -> Determination:
 
 def _of_amplitudes(drive: DriveFeatures) -> list[Determination]:
     least, most = drive.swings
-    if drive.has_one_amplitude:
+    if has_one_amplitude(drive):
         words = f"one amplitude, {_drive(most, drive)}: minor loops are extrapolated from it"
         return [Determination("minor loops", "no", words)]
     between = f"amplitudes from {_drive(least, drive)} to {_drive(most, drive)}"

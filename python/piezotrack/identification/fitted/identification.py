@@ -234,7 +234,8 @@ class Identification(IdentifiedModel):
         if self.lags is not None and (self.lags.from_zero or max(rates) < OTHER * min(rates)):
             lag = getattr(self.model, "time_constant", None)
             notes += lag_notes(self.lags, 2.0 * math.pi * rates[0], lag)
-        if not info.searched:
+        connections = [unusual_connection(data.u, data.y) for data, _ in self._fitted]
+        if not info.searched and all(one is None or one.follows for one in connections):
             drives = (drive_features(data.t, data.u, None, unit) for data, _ in self._fitted)
             notes += amplitude_notes(list(drives))
         if self.at_bound:

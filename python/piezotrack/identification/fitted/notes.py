@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..._support.units import drive_text, shown_unit
+from ...data.checks.drive_features import has_one_amplitude
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -138,7 +139,7 @@ def amplitude_notes(drives: Sequence[DriveFeatures]) -> list[str]:
         One sentence, or none.
     """
     spans = [swing for drive in drives for swing in drive.swings]
-    if not all(drive.has_one_amplitude for drive in drives) or min(spans) < ALIKE * max(spans):
+    if not all(map(has_one_amplitude, drives)) or min(spans) < ALIKE * max(spans):
         return []
     swing = drive_text(max(spans), drives[0].unit)
     return [
