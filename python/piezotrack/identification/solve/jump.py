@@ -41,6 +41,8 @@ FIRST, REVERSED = 1500, 0.1
 ALIKE, TRIED, APART = 1.1, 3, 1.5
 # Fits with a voltage of rest that was found from the one before, at most.
 ROUNDS = 3
+# Share of the stroke below which a residual is no motion, but what a search leaves.
+UNSEEN = 1e-5
 # Share of the window in which a jump is over, and of the squares above the noise that are there.
 VERY_FIRST, CARRIED = 0.01, 0.5
 
@@ -67,7 +69,7 @@ def with_rest_tried(
     """
     (record,) = problem.records
     data = record.data
-    if record.history is not None or data.warmup:
+    if record.history is not None or data.warmup or fit.cost < UNSEEN * fit.stroke:
         return fit
     if not _begins_apart(fit, data):
         return fit
