@@ -29,7 +29,8 @@ __all__ = [
 
 # Share of the cost that drifts have to take away, as an error of the model may look like one, and
 # share of the residual from which they are tried: the parameters have taken a part of them.
-GAIN, SIGN = 0.2, 0.1
+# A fit near the noise cannot lose as much: of it, half of what is above the noise.
+GAIN, SIGN, GAIN_ABOVE = 0.2, 0.1, 0.5
 # What a drift under a drive of few turns may leave, in multiples of the noise.
 NOTHING_BUT_NOISE = 1.1
 # Time constants of drifts that are taken off a residual, as shares of its window.
@@ -59,7 +60,7 @@ def with_drift_tried(
         _may_drift(record) and turns_often(record) and _shows_drift(record, fit)
         for record in problem.records
     ]
-    return _drifted(problem, fit, shown, search)
+    return _drifted(problem, fit, shown, search, GAIN * fit.cost)
 
 
 def with_drift_of_few_turns(
@@ -82,13 +83,14 @@ def with_drift_of_few_turns(
     Returns
     -------
     Identification
-        The one with drifts where these lower the cost by 20 %, and leave nothing but noise: an
-        error of the model stays beside a drift.
+        The one with drifts where these lower the cost by 20 %, or by half of what is above the
+        noise, and leave nothing but noise: an error of the model stays beside a drift.
     """
     if fit.cost <= NOTHING_BUT_NOISE * max(fit.noises):
         return fit
     few = [_may_drift(record) and not turns_often(record) for record in problem.records]
-    drifted = _drifted(problem, fit, few, search)
+    above = fit.cost - max(fit.noises)
+    drifted = _drifted(problem, fit, few, search, min(GAIN * fit.cost, GAIN_ABOVE * above))
     return drifted if drifted.cost <= NOTHING_BUT_NOISE * max(drifted.noises) else fit
 
 
@@ -97,15 +99,16 @@ def _drifted(
     fit: Identification,
     drifting: list[bool],
     search: Callable[[Problem], Identification],
+    gain: float,
 ) -> Identification:
-    """Search with drifts of some records; the fit where these lower the cost too little."""
+    """Search with drifts of some records; the fit where they lower the cost by less than a gain."""
     if not any(drifting):
         return fit
     try:
         drifted = search(with_drifts(problem, drifting))
     except (DataError, NumericalError):
         return fit
-    return drifted if drifted.cost < (1.0 - GAIN) * fit.cost else fit
+    return drifted if drifted.cost < fit.cost - gain else fit
 
 
 def with_drifts(problem: Problem, drifting: Iterable[bool]) -> Problem:

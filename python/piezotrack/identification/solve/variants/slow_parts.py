@@ -27,8 +27,12 @@ if TYPE_CHECKING:
 
 __all__ = ["MOST", "NOISY", "with_slow_parts"]
 
-# A residual of so many times the noise has hardly anything but noise in it.
-NOISY = 1.05
+# A residual of so many times the noise has hardly anything but noise in it; up to so many, a drift
+# beside less creep may explain the rest, by such a share better than more creep.
+NOISY, NEAR, LESS = 1.05, 2.0, 0.02
+# Residual beyond which creep does not explain it: such a share of the one before, and so many times
+# the noise.
+SHARE, FAR = 0.5, 5.0
 # Share of the residual that each relaxation has to take away, and of the cost that a search has to:
 # so much of all, or of what is above the noise.
 GAIN, GAIN_ABOVE = 0.1, 0.3
@@ -77,24 +81,34 @@ def with_slow_parts(
         replace(record, drift=False) if record.drift is None else record
         for record in problem.records
     )
-    fit = _with_creep_tried(replace(problem, records=records), search, tuple(begun))
-    creeping = replace(problem, creep=fit.model.creep_times or None)
-    return with_drift_of_few_turns(creeping, with_drift_tried(creeping, fit, search), search)
+    fits = _with_creep_tried(replace(problem, records=records), search, tuple(begun))
+    best = fits[-1]
+    # A further relaxation may have taken a part of a drift.
+    for fit in [best, *(one for one in fits[-2::-1] if one.cost < NEAR * max(one.noises))]:
+        if best.cost <= NOISY * max(best.noises):
+            break
+        creeping = replace(problem, creep=fit.model.creep_times or None)
+        fit = with_drift_of_few_turns(creeping, with_drift_tried(creeping, fit, search), search)
+        if fit.cost < (1.0 - LESS) * best.cost:
+            best = fit
+    return best
 
 
 def _with_creep_tried(
     problem: Problem, search: Callable[[Problem], Identification], begun: tuple[float, ...]
-) -> Identification:
+) -> list[Identification]:
     """Search without creep or with some, then with what the residual of the search before shows."""
     fit = search(replace(problem, creep=begun or None))
+    fits = [fit]
     if len(problem.records) > 1:
-        return fit
+        return fits
     for _ in range(ROUNDS):
         if fit.cost <= NOISY * max(fit.noises):
             break
         try:
-            times = _times_shown(fit)
-            if not times or _alike(times, fit.model.creep_times):
+            times, left = _times_shown(fit)
+            hopeless = left > max(SHARE * fit.cost, FAR * max(fit.noises))
+            if not times or hopeless or _alike(times, fit.model.creep_times):
                 break
             other = search(replace(problem, creep=times))
         except (DataError, NumericalError):
@@ -102,7 +116,8 @@ def _with_creep_tried(
         if not other.cost < _less(fit.cost, max(fit.noises)):
             break
         fit = other
-    return fit
+        fits.append(fit)
+    return fits
 
 
 def _less(left: float, noise: float) -> float:
@@ -118,8 +133,8 @@ def _alike(times: tuple[float, ...], others: tuple[float, ...]) -> bool:
     return all(abs(math.log(one / other)) < math.log(STEP) for one, other in pairs)
 
 
-def _times_shown(fit: Identification) -> tuple[float, ...]:
-    """Return the time constants of the relaxations that lower a residual most [s], or none."""
+def _times_shown(fit: Identification) -> tuple[tuple[float, ...], float]:
+    """Return the time constants of relaxations that lower a residual most [s], and it then [m]."""
     data = fit.data
     still = _with_creep(fit)
     record = LinearisedRecord(still, data)
@@ -144,7 +159,7 @@ def _times_shown(fit: Identification) -> tuple[float, ...]:
             break
         left = costs[best]
         found.append(best)
-    return tuple(sorted(found))
+    return tuple(sorted(found)), left
 
 
 def _apart(time: float, other: float) -> bool:
