@@ -15,9 +15,7 @@ from .trials import AS_WELL, MANY_WEIGHTS, MORE_THAN_NOISE, NEAR_NOISE, NOTHING_
 if TYPE_CHECKING:
     from ...fitted.identification import Identification
     from ...fitted.start import Rest
-    from ...methods.choice import MethodChoice
     from ...problem.problem import Problem
-    from ..run import Run
     from .trials import Trials, Tried
 
 __all__ = ["OnWholes"]
@@ -41,8 +39,6 @@ class OnWholes:
     """Fits to whole records, of which the first parts do not show all."""
 
     problem: Problem
-    methods: MethodChoice
-    how: Run
     trials: Trials
 
     def fit(self, best: Tried) -> Identification:
@@ -69,7 +65,7 @@ class OnWholes:
     ) -> Identification:
         """Fit a model, from a structure or anew."""
         kept = None if start is None else replace(start, kept=True)
-        return self.trials.identified(self.problem, one.info, self.how, kept, rest)
+        return self.trials.identified(self.problem, one.info, self.trials.how, kept, rest)
 
     def least(self, found: _Whole, shown: Structure | None = None) -> _Whole:
         """Return what was found, or another model that leaves far less.
@@ -89,7 +85,7 @@ class OnWholes:
         """Fit the best model of many weights anew, and others where it shows further dynamics."""
         best, fit = found
         one = next((one for one in [best, *self.trials.others(best)] if one.start), None)
-        if one is None or one.start is None or not self.methods.weights._resumes:
+        if one is None or one.start is None or not self.trials.methods.weights._resumes:
             return found
         with suppress(DataError, NumericalError):
             anew = self.fitted(one)
@@ -106,7 +102,7 @@ class OnWholes:
         if few is not None and fit.cost > MORE_THAN_NOISE * min(fit.noises):
             with suppress(DataError, NumericalError):
                 shown, rest = Structure.of(fit), rest_of(fit)
-                return self.trials.searched(self.problem, few.info, self.how, shown, rest)
+                return self.trials.searched(self.problem, few.info, self.trials.how, shown, rest)
         return None
 
 

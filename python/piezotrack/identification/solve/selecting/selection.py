@@ -100,7 +100,7 @@ def identify_best(problem: Problem, methods: MethodChoice, run: Run) -> Identifi
     best = best_of(trials.found, BETTER_ON_ONE_LOOP if one_loop else BETTER)
 
     with shares.begin(len(infos)):
-        fit = OnWholes(problem, methods, run, trials).fit(best)
+        fit = OnWholes(problem, trials).fit(best)
     return with_trials(fit, trials.found, float(first.records[0].data.t[-1]))
 
 
