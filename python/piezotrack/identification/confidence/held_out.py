@@ -257,7 +257,8 @@ class _Normal:
         for first, one in zip(self.first, records, strict=False):
             if one.fitted:
                 own = slice(first, first + one.sizes.size)
-                ridge[own] += one.weight * least / np.maximum(one.sizes, 1e-300) ** 2
+                # What has no effect on the record is held at 0 by a finite weight.
+                ridge[own] += one.weight / np.maximum(one.sizes / math.sqrt(least), 1e-8) ** 2
         self.products += np.diag(ridge)
 
     def _of(self, i: int) -> tuple[Places, Array]:
