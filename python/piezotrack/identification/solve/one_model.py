@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ..._support.display.progress_bar import ProgressBar
@@ -25,7 +26,7 @@ from .variants.drift import (
     with_drifts,
 )
 from .variants.exponent import may_have_exponent, with_exponent_tried
-from .weights import solve_least_squares
+from .weights import Structure, solve_least_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from ..methods.choice import Method, Search
     from ..problem.problem import Problem
     from .run import Run
-    from .weights import Structure
 
     Solve = Callable[[Problem], Identification]
 
@@ -44,6 +44,8 @@ __all__ = ["identify_model", "weights_of"]
 # Parts of the time of descents and of a swarm, for the progress: without an earlier motion, and
 # with it.
 HISTORIES, SWARM = (2.0, 1.0), (9.0, 1.0)
+# A residual of so many times the noise has hardly anything but noise in it.
+NOISY = 1.05
 
 
 def identify_model(
@@ -89,8 +91,21 @@ def identify_model(
         def with_drift(fit: Identification, search: Solve) -> Identification:
             return with_drift_tried(other, fit, search) if isinstance(method, Descents) else fit
 
-        def at_rest() -> Identification:
-            fit = with_rest(other, plain, rest)
+        def least_at_rest(moving: Identification | None) -> Identification:
+            if moving is None or start is not None or not isinstance(method, LeastSquares):
+                return with_rest(other, plain, rest)
+            # From the structure without the jump, and anew where that leaves more than noise.
+            shown = Structure.of(moving)
+            fit = with_rest(other, lambda one, begun=None: plain(one, begun or shown), rest)
+            if fit.cost >= (1.0 - GAIN) * moving.cost:
+                return fit
+            anew = None
+            if fit.cost < NOISY * min(fit.noises):
+                anew = Structure.of(fit, kept=True)
+            return with_rest(other, lambda one, begun=None: plain(one, begun or anew), rest_of(fit))
+
+        def at_rest(moving: Identification | None = None) -> Identification:
+            fit = least_at_rest(moving)
             # From the voltage of rest that the exponent 1 shows: each fit takes longer.
             shown = rest_of(fit)
             fit = with_drift(fit, lambda one: with_rest(one, plain, shown))
@@ -106,7 +121,7 @@ def identify_model(
         fit = _with_exponent(with_drifts(other, drifts_of(fit)), fit, method, run)
         # What is worse than another model without a jump lacks more than that.
         worse = start is not None and fit.cost > start.cost
-        return fit if worse or len(other.records) > 1 else with_rest_tried(other, fit, at_rest)
+        return fit if worse or len(other.records) > 1 else with_rest_tried(other, fit, partial(at_rest, fit))
 
     def identify(other: Problem, start: Structure | None, rest: Rest | None) -> Identification:
         fit = still(other, start, rest)

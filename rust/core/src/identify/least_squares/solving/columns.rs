@@ -34,15 +34,15 @@ struct Parts {
     bare: Stepped,
     /// With each number of the dynamics changed a little.
     nudged: Vec<Stepped>,
-    /// Factors by which each relaxation's departure decays within so many sampling intervals.
+    /// Factors by which each relaxation's departure decays within each of the steps.
     decay: Vec<Vec<f64>>,
 }
 
 impl Parts {
-    fn of(fit: &Fit<'_>, dt: f64, longest: usize) -> Result<Self> {
-        let stepped = |part| Stepped::new(part, dt, longest);
+    fn of(fit: &Fit<'_>, dt: f64, gaps: &[usize]) -> Result<Self> {
+        let stepped = |part| Stepped::new(part, dt, gaps);
         let bare = Relaxation::new(&[], &[], fit.dynamics())?;
-        let factor = |time: &f64, gap: usize| libm::exp(-dt * index(gap) / time);
+        let factor = |time: &f64, gap: &usize| libm::exp(-dt * index(*gap) / time);
         let decays = |gap| fit.times.iter().map(|time| factor(time, gap)).collect();
         let slots = fit.layout().poles();
         let nudged = slots.map(|slot| {
@@ -55,7 +55,7 @@ impl Parts {
             whole: stepped(fit.relaxation()?),
             bare: stepped(bare),
             nudged: nudged?,
-            decay: (1..=longest).map(decays).collect(),
+            decay: gaps.iter().map(decays).collect(),
         })
     }
 }
@@ -95,7 +95,7 @@ impl<'f, 'a> Columns<'f, 'a> {
     pub fn of(fit: &'f Fit<'a>, r: usize) -> Result<Self> {
         let (layout, own, record) = (fit.layout(), fit.own(r), &fit.common.records[r]);
         let strides = Strides::of(fit, r, fit.windows[r].end);
-        let parts = Parts::of(fit, record.drive.dt, strides.longest())?;
+        let parts = Parts::of(fit, record.drive.dt, strides.gaps())?;
         let inner = layout.weights + layout.bends + layout.corners;
         let bundle = VECTORS * MOST_LANES;
         let width = (inner + 1).div_ceil(bundle) * bundle;
@@ -166,14 +166,14 @@ impl<'f, 'a> Columns<'f, 'a> {
             }
         }
         let steps: Vec<(usize, Hold)> =
-            (first..first + count).map(|at| (self.strides.gap(at), self.hold.until(at))).collect();
+            (first..first + count).map(|at| (self.strides.step(at), self.hold.until(at))).collect();
         dispatch_fused(OfStage { columns: self, steps: &steps });
         let mut step = usize::from(first == 0);
         for alike in steps[step..].chunk_by(|a, b| a == b) {
-            let (gap, hold) = alike[0];
+            let (length, hold) = alike[0];
             dispatch_fused(Bundles {
                 part: &self.parts.whole,
-                gap,
+                length,
                 hold,
                 followers: &mut self.followers,
                 inputs: &self.inputs,
@@ -196,21 +196,21 @@ impl<'f, 'a> Columns<'f, 'a> {
         let Parts { whole, bare, nudged, decay } = &self.parts;
         let mut stage = self.followers[self.inner];
         self.stage.clear();
-        for (i, &(gap, hold)) in steps.iter().enumerate() {
+        for (i, &(length, hold)) in steps.iter().enumerate() {
             let input = self.inputs[i * self.width + self.inner];
             if self.at + i > 0 {
-                stage.next(&whole.part, whole.over(gap), hold, input);
+                stage.next(&whole.part, whole.over(length), hold, input);
                 // These move from sample to sample whatever the hold.
                 for (column, q) in self.reached.iter_mut().zip(stage.state.creep) {
-                    bare.part.step(bare.over(gap), &mut column.state, q);
+                    bare.part.step(bare.over(length), &mut column.state, q);
                 }
-                let faded = self.faded.iter_mut().zip(&mut self.left).zip(&decay[gap - 1]);
+                let faded = self.faded.iter_mut().zip(&mut self.left).zip(&decay[length]);
                 for ((column, left), factor) in faded {
                     *left *= factor;
-                    bare.part.step(bare.over(gap), &mut column.state, *left);
+                    bare.part.step(bare.over(length), &mut column.state, *left);
                 }
                 for (column, one) in self.nudged.iter_mut().zip(nudged) {
-                    column.next(&one.part, one.over(gap), hold, input);
+                    column.next(&one.part, one.over(length), hold, input);
                 }
             }
             self.stage.push(stage.state);
@@ -241,10 +241,11 @@ impl WithSimd for OfStage<'_, '_, '_> {
     }
 }
 
-/// Followers in lanes along some samples, which are so many intervals apart.
+/// Followers in lanes along some samples, by steps of one length.
 struct Bundles<'s> {
     part: &'s Stepped,
-    gap: usize,
+    /// Which of the steps.
+    length: usize,
     hold: Hold,
     followers: &'s mut [Follower],
     inputs: &'s [f64],
@@ -259,7 +260,7 @@ impl WithSimd for Bundles<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let lanes = VECTORS * S::F64_LANES;
         let width = self.followers.len();
-        let (part, flow) = (&self.part.part, self.part.over(self.gap));
+        let (part, flow) = (&self.part.part, self.part.over(self.length));
         for (b, bundle) in self.followers.chunks_exact_mut(lanes).enumerate() {
             let mut state = RelaxationState {
                 input: gathered(simd, bundle, |one| one.state.input),

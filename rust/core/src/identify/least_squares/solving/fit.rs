@@ -4,6 +4,7 @@ use core::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use super::form::Form;
+use super::judged::Judged;
 use super::layout::{Layout, Own};
 use crate::error::{Error, Result};
 use crate::identify::least_squares::common::Common;
@@ -53,9 +54,9 @@ pub(in crate::identify::least_squares) struct Fit<'a> {
     pub kept: Vec<Kept>,
     /// Whether the motion is that of the stage's simulation, exact between samples too.
     pub exact: bool,
-    /// Window of each record that is judged, and every how many of its samples.
+    /// Window of each record that is judged, and which of its samples.
     pub windows: Vec<Range<usize>>,
-    pub every: Vec<usize>,
+    pub judged: Vec<Judged>,
     /// The unknowns: those of the stage, see [`Layout`], then those of each record, see [`Own`].
     pub x: Vec<f64>,
     pub rms: f64,
@@ -86,7 +87,7 @@ impl<'a> Fit<'a> {
             kept: none_kept(common),
             exact: false,
             windows: windows(common),
-            every: vec![1; common.records.len()],
+            judged: common.records.iter().map(Judged::all).collect(),
             x: Vec::new(),
             rms: f64::INFINITY,
             lags: None,
@@ -108,7 +109,7 @@ impl<'a> Fit<'a> {
             times: self.times,
             shape: self.shape,
             windows: windows(common),
-            every: vec![1; common.records.len()],
+            judged: common.records.iter().map(Judged::all).collect(),
             x: self.x,
             zones: self.zones,
             bent: self.bent,
@@ -311,19 +312,18 @@ impl<'a> Fit<'a> {
     }
 
     /// Samples of a record that are judged.
-    pub fn judged(&self, r: usize) -> impl Iterator<Item = usize> {
-        let record = self.common.records[r];
-        self.windows[r].clone().step_by(self.every[r]).filter(move |&k| record.counts(k))
-    }
-
-    /// How much a judged sample of a record counts.
-    pub fn weight(&self, r: usize) -> f64 {
-        self.common.weights[r] * index(self.every[r])
+    pub fn judged(&self, r: usize) -> impl Iterator<Item = (usize, f64)> {
+        let (record, window) = (self.common.records[r], &self.windows[r]);
+        let weight = self.common.weights[r];
+        let judged = self.judged[r].within(window.start, window.end);
+        judged
+            .filter(move |(k, _)| record.counts(*k))
+            .map(move |(k, share)| (k, weight * index(share)))
     }
 
     /// Samples that are judged, each as often as it counts.
     pub fn counted(&self) -> f64 {
-        (0..self.windows.len()).map(|r| self.weight(r) * index(self.judged(r).count())).sum()
+        (0..self.windows.len()).flat_map(|r| self.judged(r)).map(|(_, weight)| weight).sum()
     }
 
     /// RMS deviation in the windows, m.
@@ -331,27 +331,27 @@ impl<'a> Fit<'a> {
         self.common.count(1);
         let (mut sum, mut count) = (0.0, 0.0);
         for r in 0..self.common.records.len() {
-            let Ok((squares, samples)) = self.squares(r) else { return f64::INFINITY };
-            sum += self.weight(r) * squares;
-            count += self.weight(r) * index(samples);
+            let Ok((squares, counted)) = self.squares(r) else { return f64::INFINITY };
+            sum += squares;
+            count += counted;
         }
         libm::sqrt(sum / count)
     }
 
     /// RMS deviation in the window of one record, m.
     pub fn deviation_of(&self, r: usize) -> f64 {
-        self.squares(r).map_or(f64::INFINITY, |(sum, count)| libm::sqrt(sum / index(count)))
+        self.squares(r).map_or(f64::INFINITY, |(sum, count)| libm::sqrt(sum / count))
     }
 
-    /// Sum of the squares of the deviations of a record, and how many.
-    fn squares(&self, r: usize) -> Result<(f64, usize)> {
+    /// Sum of the squares of the deviations of a record, each as often as it counts, and of these.
+    fn squares(&self, r: usize) -> Result<(f64, f64)> {
         let (motion, added) = (self.motion(r)?, self.added(r));
         let y = self.common.records[r].y;
-        let (mut sum, mut count) = (0.0, 0);
-        for k in self.judged(r) {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (k, weight) in self.judged(r) {
             let error = y[k] - motion[k] - added(k);
-            sum += error * error;
-            count += 1;
+            sum += weight * error * error;
+            count += weight;
         }
         Ok((sum, count))
     }
@@ -359,7 +359,8 @@ impl<'a> Fit<'a> {
     /// Residual of the displacement of a record, m.
     pub fn rest(&self, r: usize) -> Result<Vec<f64>> {
         let added = self.added(r);
-        let all = Self { every: vec![1; self.every.len()], ..self.clone() };
+        let judged = self.common.records.iter().map(Judged::all).collect();
+        let all = Self { judged, ..self.clone() };
         let left = self.common.records[r].y.iter().zip(all.motion(r)?).enumerate();
         Ok(left.map(|(k, (y, x))| y - x - added(k)).collect())
     }

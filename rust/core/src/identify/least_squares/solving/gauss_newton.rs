@@ -158,7 +158,6 @@ impl Fit<'_> {
         let mut columns = Columns::of(self, r)?;
         let exact = if self.exact { Some(self.undelayed(r)?) } else { None };
         let late = Late::new(self.delay(r), drive.dt);
-        let factor = libm::sqrt(self.weight(r));
         let mut recent = Recent::new(columns.count(), late);
         let mut row = vec![0.0; self.unknowns()];
         let mut judged = self.judged(r).peekable();
@@ -168,21 +167,25 @@ impl Fit<'_> {
             for (i, k) in places.into_iter().enumerate() {
                 motion.resize(k, motion.last().copied().unwrap_or_default());
                 motion.push(exact.as_ref().map_or(columns.displacement(i), |exact| exact[k]));
-                let counts = judged.next_if_eq(&k).is_some();
-                if !counts && late.is_none() {
-                    continue;
+                let counts = judged.next_if(|(place, _)| *place == k);
+                if !late.is_none() {
+                    recent.push(k, columns.row(i));
                 }
-                recent.push(k, columns.row(i));
-                if !counts {
-                    continue;
+                let Some((_, weight)) = counts else { continue };
+                if late.is_none() {
+                    let (stage, departures) = columns.row(i).split_at(layout.count());
+                    row[..layout.count()].copy_from_slice(stage);
+                    row[own.departures.clone()].copy_from_slice(departures);
+                } else {
+                    recent.read(k, &mut row[..layout.count()], 0);
+                    recent.read(k, &mut row[own.departures.clone()], layout.count());
                 }
-                recent.read(k, &mut row[..layout.count()], 0);
-                recent.read(k, &mut row[own.departures.clone()], layout.count());
                 row[own.offset.clone()].fill(1.0);
                 row[own.drift.clone()].fill(fades(k, start));
                 let (before, after) = late.between(k);
                 row[own.delay.clone()].fill((motion[before] - motion[after]) / drive.dt);
                 let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
+                let factor = libm::sqrt(weight);
                 let left = factor * (y[k] - late.of(k, |k| motion[k]) - added(k));
                 squares += left * left;
                 for entry in &mut row {
@@ -225,10 +228,6 @@ impl Recent {
             let place = self.rows.partition_point(|(at, _)| *at < k);
             &self.rows[place].1[part.clone()]
         };
-        if self.late.is_none() {
-            entries.copy_from_slice(row(k));
-            return;
-        }
         let (before, after) = self.late.between(k);
         for ((entry, before), after) in entries.iter_mut().zip(row(before)).zip(row(after)) {
             *entry = self.late.mixed(*before, *after);

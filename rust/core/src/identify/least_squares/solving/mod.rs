@@ -5,6 +5,7 @@ pub(super) mod fit;
 mod follower;
 pub(super) mod form;
 mod gauss_newton;
+pub(super) mod judged;
 mod late;
 mod layout;
 mod record_path;

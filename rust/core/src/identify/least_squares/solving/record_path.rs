@@ -112,12 +112,12 @@ impl<'a> Fit<'a> {
             return inputs.iter().map(relaxed).collect();
         };
         let strides = Strides::of(self, r, drive.u.len());
-        let creep = Stepped::new(creep, drive.dt, strides.longest());
+        let creep = Stepped::new(creep, drive.dt, strides.gaps());
         let mut followers: Vec<Follower> =
             inputs.iter().map(|input| Follower::at_rest(&creep.part, *input, &[])).collect();
         for (place, &k) in strides.places().iter().enumerate().skip(1) {
             take(&mut inputs, k);
-            let flow = creep.over(strides.gap(place));
+            let flow = creep.over(strides.step(place));
             for (follower, input) in followers.iter_mut().zip(&inputs) {
                 follower.next(&creep.part, flow, drive.hold.until(k), *input);
             }
@@ -161,7 +161,7 @@ impl<'a> Fit<'a> {
         let drive = self.common.records[r].drive;
         let end = self.windows[r].end;
         let strides = Strides::of(self, r, end);
-        let whole = Stepped::new(self.relaxation()?, drive.dt, strides.longest());
+        let whole = Stepped::new(self.relaxation()?, drive.dt, strides.gaps());
         let mut walk = self.walk(r);
         let creep = self.creep_before(r, 1);
         let mut follower: Option<Follower> = None;
@@ -170,7 +170,7 @@ impl<'a> Fit<'a> {
             let output = self.bent(self.sum(walk.at(k)));
             let x = match &mut follower {
                 Some(follower) => {
-                    let flow = whole.over(strides.gap(place));
+                    let flow = whole.over(strides.step(place));
                     follower.next(&whole.part, flow, drive.hold.until(k), output)
                 }
                 none => none.insert(Follower::at_rest(&whole.part, output, &creep[0])).state.x,

@@ -6,65 +6,78 @@ use crate::models::{Relaxation, RelaxationFlow};
 use crate::signal::{Hold, index};
 
 /// Samples of a record at which its motion is computed: all of them, or, of a held drive of which
-/// every so many are judged, these, those at which they are read, those at which the drive changes,
+/// not all are judged, these, those at which they are read, those at which the drive changes,
 /// and the last. Between these, one step is exact.
-pub(super) struct Strides(Vec<usize>);
+pub(super) struct Strides {
+    places: Vec<usize>,
+    /// Different lengths of the steps, in intervals, in order; and which of them leads to each place.
+    gaps: Vec<usize>,
+    steps: Vec<usize>,
+}
 
 impl Strides {
     /// Those of record `r` before sample `end`.
     pub fn of(fit: &Fit<'_>, r: usize, end: usize) -> Self {
         let record = &fit.common.records[r];
         let u = record.drive.u;
-        if fit.every[r] == 1 || fit.exact || record.drive.hold != Hold::Zero {
-            return Self((0..end).collect());
+        if fit.judged[r].is_all() || record.drive.hold != Hold::Zero {
+            return Self { places: (0..end).collect(), gaps: vec![1], steps: vec![0; end] };
         }
-        // Also in the warm-up and where readings are left out, or a step would be of any length.
-        let (every, first) = (fit.every[r], fit.windows[r].start);
-        let regular = |k: usize| k % every == first % every;
         let changes = |k: usize| k == 0 || u[k].to_bits() != u[k - 1].to_bits();
-        let mut needed: Vec<bool> =
-            (0..end).map(|k| regular(k) || changes(k) || k + 1 == end).collect();
+        let mut needed: Vec<bool> = (0..end).map(|k| changes(k) || k + 1 == end).collect();
+        // Also in the warm-up and where readings are left out, or a step would be of any length.
+        for (k, _) in fit.judged[r].within(0, end) {
+            needed[k] = true;
+        }
         let late = Late::new(fit.delay(r), record.drive.dt);
-        for k in fit.judged(r).filter(|_| !late.is_none()) {
+        let read_late = !late.is_none() || !fit.own(r).delay.is_empty();
+        for (k, _) in fit.judged(r).filter(|_| read_late) {
             let (before, after) = late.between(k);
             (needed[before], needed[after]) = (true, true);
         }
-        Self((0..end).filter(|k| needed[*k]).collect())
+        let places: Vec<usize> = (0..end).filter(|k| needed[*k]).collect();
+        let between = |i: usize| if i == 0 { 1 } else { places[i] - places[i - 1] };
+        let each: Vec<usize> = (0..places.len()).map(between).collect();
+        let mut gaps = each.clone();
+        gaps.sort_unstable();
+        gaps.dedup();
+        let steps = each.iter().map(|gap| gaps.partition_point(|other| other < gap)).collect();
+        Self { places, gaps, steps }
     }
 
     /// The samples, in order.
     pub fn places(&self) -> &[usize] {
-        &self.0
+        &self.places
     }
 
-    /// Intervals from the sample before to the one at `place` of [`Self::places`].
-    pub fn gap(&self, place: usize) -> usize {
-        if place == 0 { 1 } else { self.0[place] - self.0[place - 1] }
+    /// Different lengths of the steps, in intervals.
+    pub fn gaps(&self) -> &[usize] {
+        &self.gaps
     }
 
-    /// The longest of them.
-    pub fn longest(&self) -> usize {
-        (0..self.0.len()).map(|place| self.gap(place)).max().unwrap_or(1)
+    /// Which of these is the step to a place of [`Self::places`].
+    pub fn step(&self, place: usize) -> usize {
+        self.steps[place]
     }
 }
 
-/// A part of the stage with its steps of one interval, of two, and so on.
+/// A part of the stage with its steps.
 pub(super) struct Stepped {
     pub part: Relaxation,
     flows: Vec<RelaxationFlow>,
 }
 
 impl Stepped {
-    /// With steps of up to `longest` intervals of `dt` seconds.
-    pub fn new(part: Relaxation, dt: f64, longest: usize) -> Self {
-        let flows = (1..=longest).map(|gap| part.flow(dt * index(gap))).collect();
+    /// With steps of so many intervals of `dt` seconds each.
+    pub fn new(part: Relaxation, dt: f64, gaps: &[usize]) -> Self {
+        let flows = gaps.iter().map(|gap| part.flow(dt * index(*gap))).collect();
         Self { part, flows }
     }
 
-    /// The step over so many intervals.
+    /// The step of one of these lengths, by its place among them.
     #[inline(always)]
-    pub fn over(&self, gap: usize) -> &RelaxationFlow {
-        &self.flows[gap - 1]
+    pub fn over(&self, length: usize) -> &RelaxationFlow {
+        &self.flows[length]
     }
 }
 
@@ -75,21 +88,22 @@ mod tests {
     use crate::identify::least_squares::common::Common;
     use crate::identify::least_squares::solving::fit::{Beginning, Fit};
     use crate::identify::least_squares::solving::form::Form;
+    use crate::identify::least_squares::solving::judged::Judged;
     use crate::identify::least_squares::weights_record::{WeightsDelay, WeightsRecord};
     use crate::identify::records::history::History;
     use crate::models::Model;
     use crate::signal::{Drive, Hold, NEVER};
 
-    /// A record of plays under a held drive, of which every so many samples are judged.
+    /// A record of plays under a held drive, of which about so many samples are judged.
     fn with_fit<T>(
         record: WeightsRecord<'_>,
-        every: usize,
+        most: usize,
         of: impl FnOnce(Fit<'_>) -> Result<T>,
     ) -> Result<T> {
         let model = Model::named("prandtl-ishlinskii")?;
         let plays = model.superposition().ok_or_else(|| Error::Data("no plays".into()))?;
         let common = Common::new((model, plays), vec![record], false, NEVER);
-        of(Fit { every: vec![every], ..Fit::new(&common, &[2.0, 10.0]) })
+        of(Fit { judged: vec![Judged::thinned(&record, most)], ..Fit::new(&common, &[2.0, 10.0]) })
     }
 
     #[test]
@@ -97,17 +111,17 @@ mod tests {
         let (u, left_out) = ([1.0; 500], [true; 500]);
         let drive = Drive { u: &u, dt: 1e-3, hold: Hold::Zero };
         let record = WeightsRecord { left_out: &left_out, ..WeightsRecord::of(drive, &u, 207) };
-        let longest = with_fit(record, 5, |fit| Ok(Strides::of(&fit, 0, u.len()).longest()))?;
-        assert_eq!(longest, 5);
+        let gaps = with_fit(record, 60, |fit| Ok(Strides::of(&fit, 0, u.len()).gaps().to_vec()))?;
+        assert!(gaps.iter().all(|gap| *gap <= 8), "{gaps:?}");
         Ok(())
     }
 
-    /// Motion of plays that creep, read late.
-    fn motion(u: &[f64], every: usize, lag: &[f64]) -> Result<Vec<f64>> {
+    /// Motion of plays that creep, read late, and the samples of about so many that are judged.
+    fn motion(u: &[f64], most: usize, lag: &[f64]) -> Result<(Vec<f64>, Vec<usize>)> {
         let drive = Drive { u, dt: 1e-3, hold: Hold::Zero };
         let delay = WeightsDelay::Fitted(0.0, 0.01);
         let record = WeightsRecord { delay, ..WeightsRecord::of(drive, u, 3) };
-        with_fit(record, every, |mut fit| {
+        with_fit(record, most, |mut fit| {
             fit.restructure(|fit| {
                 fit.begins = vec![Beginning { history: History::Settled, from: 0.0 }];
                 fit.times = vec![0.02, 0.3];
@@ -117,7 +131,7 @@ mod tests {
             fit.x[layout.weights()].fill(0.3);
             fit.x[layout.creep_weights()].fill(0.1);
             fit.x[own.delay].fill(3.4e-3);
-            fit.motion(0)
+            Ok((fit.motion(0)?, fit.judged(0).map(|(k, _)| k).collect()))
         })
     }
 
@@ -127,8 +141,9 @@ mod tests {
         let u: Vec<f64> = (0..600).map(|k| levels[k / 7 % levels.len()]).collect();
         // Behind creep, the input of a lag is taken to be linear within a step.
         for (lag, most) in [(&[][..], 1e-12), (&[-5.0][..], 0.02)] {
-            let (all, some) = (motion(&u, 1, lag)?, motion(&u, 5, lag)?);
-            for k in (3..u.len()).step_by(5) {
+            let ((all, _), (some, judged)) = (motion(&u, 600, lag)?, motion(&u, 120, lag)?);
+            assert!((50..=120).contains(&judged.len()));
+            for k in judged {
                 assert!((all[k] - some[k]).abs() < most, "{k}: {} and {}", all[k], some[k]);
             }
         }

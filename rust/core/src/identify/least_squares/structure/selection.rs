@@ -16,6 +16,7 @@ use crate::identify::least_squares::settings::{
 };
 use crate::identify::least_squares::solving::fit::{Beginning, Fit};
 use crate::identify::least_squares::solving::form::Form;
+use crate::identify::least_squares::solving::judged::Judged;
 use crate::identify::least_squares::weights_record::WeightsRecord;
 use crate::identify::parameters::drift::DriftKind;
 use crate::identify::records::history::History;
@@ -69,10 +70,13 @@ pub(in crate::identify::least_squares) fn search<'a>(
     common.count(few.evaluations());
     let mut fit = chosen.on(common);
     let kept = settings.start.as_ref().is_none_or(|start| start.kept);
+    let all = core::mem::replace(&mut fit.judged, judged_of(common));
     if kept {
         fit.settle(1e-4)?;
     }
     fit.exact = true;
+    fit.settle(ROUGH)?;
+    fit.judged = all;
     fit.settle(if kept { 1e-8 } else { ROUGH })?;
     drop_modes(&mut fit)?;
     Some(fit)
@@ -83,6 +87,15 @@ fn rows_of(common: &Common<'_>) -> usize {
     if common.of.nodes() == Nodes::Levels { ROWS_OF_LEVELS } else { ROWS }
 }
 
+/// Samples that are judged for choices, of each record.
+fn judged_of(common: &Common<'_>) -> Vec<Judged> {
+    let of = |one: &WeightsRecord<'_>| {
+        let times = if one.jumps() { OF_JUMPS } else { 1 };
+        Judged::thinned(one, times * rows_of(common))
+    };
+    common.records.iter().map(of).collect()
+}
+
 /// The structure, on records that may be thinned.
 fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
     let nodes = match &settings.nodes {
@@ -91,11 +104,7 @@ fn choose<'a>(common: &'a Common<'a>, settings: &Settings) -> Option<Fit<'a>> {
         NodesKind::Auto => spread(common, (few_or_many(common), 1.0), false),
     };
     let mut fit = Fit::new(common, &nodes);
-    let every = |one: &WeightsRecord<'_>| {
-        let times = if one.jumps() { OF_JUMPS } else { 1 };
-        one.samples().div_ceil(times * rows_of(common))
-    };
-    fit.every = common.records.iter().map(every).collect();
+    fit.judged = judged_of(common);
     fit.settle(ROUGH)?;
     if settings.start.is_none() {
         search_shape(&mut fit)?;
