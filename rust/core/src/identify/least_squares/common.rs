@@ -26,6 +26,8 @@ pub(super) struct Common<'a> {
     pub stroke: f64,
     /// Noise of the readings, of the record that has most, m.
     pub noise: f64,
+    /// How many times the drive of each record has changed up to each sample.
+    pub levels: Vec<Vec<usize>>,
     /// Simulations so far.
     evaluations: AtomicUsize,
 }
@@ -42,8 +44,9 @@ impl<'a> Common<'a> {
         let drive = ends(records.iter().map(|one| range(&one.drive.u[one.start..])));
         let noise = records.iter().map(|one| sample_noise(&one.y[one.start..])).fold(0.0, f64::max);
         let weights = records.iter().map(|one| one.weight).collect();
+        let levels = records.iter().map(WeightsRecord::levels).collect();
         let evaluations = AtomicUsize::new(0);
-        Self { model, of, records, weights, falls, stop, drive, stroke, noise, evaluations }
+        Self { model, of, records, weights, falls, stop, drive, stroke, noise, levels, evaluations }
     }
 
     /// Counts simulations.

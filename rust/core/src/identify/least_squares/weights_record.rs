@@ -90,6 +90,23 @@ impl<'a> WeightsRecord<'a> {
         if k > 0 && self.drive.hold.until(k) == Hold::First { self.drive.dt } else { f64::INFINITY }
     }
 
+    /// Whether the drive at a sample is another one than before.
+    pub(super) fn changes(&self, k: usize) -> bool {
+        k > 0 && self.drive.u[k].to_bits() != self.drive.u[k - 1].to_bits()
+    }
+
+    /// How many times the drive has changed up to each sample; of one that is not held, as if it
+    /// changed at each.
+    pub(super) fn levels(&self) -> Vec<usize> {
+        let held = self.drive.hold == Hold::Zero;
+        let mut level = 0;
+        let mut count = |k: usize| {
+            level += usize::from(k > 0 && (!held || self.changes(k)));
+            level
+        };
+        (0..self.drive.u.len()).map(&mut count).collect()
+    }
+
     /// Whether the drive jumps from one sample to the next.
     pub(super) fn jumps(&self) -> bool {
         let u = &self.drive.u[self.start..];

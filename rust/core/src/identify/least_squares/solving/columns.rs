@@ -156,8 +156,16 @@ impl<'f, 'a> Columns<'f, 'a> {
         if count == 0 {
             return None;
         }
-        for (inputs, &k) in self.inputs.chunks_exact_mut(self.width).zip(&places) {
-            self.fit.inputs(self.walk.at(k), &mut inputs[..=self.inner]);
+        let mut level = usize::MAX;
+        for (i, &k) in places.iter().enumerate() {
+            let from = i * self.width;
+            if self.walk.level(k) == level {
+                self.inputs
+                    .copy_within(from - self.width..from - self.width + self.inner + 1, from);
+            } else {
+                level = self.walk.level(k);
+                self.fit.inputs(self.walk.at(k), &mut self.inputs[from..=from + self.inner]);
+            }
         }
         // The first sample of all is where the followers are at rest.
         if first == 0 {

@@ -24,7 +24,7 @@ pub(in crate::identify::least_squares) struct Beginning {
     pub from: f64,
 }
 
-/// Signals of all samples of a record, one sample after the other.
+/// Signals of a record after each change of its drive, one after the other.
 pub(in crate::identify::least_squares) type Kept = OnceLock<Arc<[f64]>>;
 
 /// A stage on its way to the best one of its structure.

@@ -14,6 +14,8 @@ const SINCE_CHANGE: usize = 50;
 #[derive(Clone, Debug)]
 pub(in crate::identify::least_squares) struct Judged {
     places: Arc<[usize]>,
+    /// These, and the samples at which the drive changes.
+    steps: Arc<[usize]>,
     end: usize,
 }
 
@@ -21,7 +23,8 @@ impl Judged {
     /// All samples.
     pub fn all(record: &WeightsRecord<'_>) -> Self {
         let end = record.y.len();
-        Self { places: (0..end).collect(), end }
+        let places: Arc<[usize]> = (0..end).collect();
+        Self { steps: places.clone(), places, end }
     }
 
     /// About so many of the window at most: every so many, and fewer the longer the drive has stayed.
@@ -37,28 +40,31 @@ impl Judged {
     }
 
     fn every(record: &WeightsRecord<'_>, every: usize) -> Self {
-        let (u, end) = (record.drive.u, record.y.len());
-        let changes = |k: usize| k < end && u[k].to_bits() != u[k - 1].to_bits();
-        let mut places = Vec::with_capacity(end / every + 1);
+        let end = record.y.len();
+        let (mut places, mut steps) = (Vec::new(), Vec::new());
         let (mut place, mut changed) = (0, 0);
         while place < end {
             places.push(place);
+            steps.push(place);
             let longest = even((place - changed) / SINCE_CHANGE).max(every);
             let mut next = place;
             loop {
                 next += 1;
                 // The reading at a change is the last one before what follows from it.
-                if changes(next) {
+                if next < end && record.changes(next) {
                     changed = next;
                 }
                 let moved = changed > place && next >= place + every;
                 if moved || next == place + longest || next == record.start {
                     break;
                 }
+                if changed == next {
+                    steps.push(next);
+                }
             }
             place = next;
         }
-        Self { places: places.into(), end }
+        Self { places: places.into(), steps: steps.into(), end }
     }
 
     /// Samples of a window that begins at `start`.
@@ -69,6 +75,11 @@ impl Judged {
     /// Whether all samples are judged.
     pub fn is_all(&self) -> bool {
         self.places.len() == self.end
+    }
+
+    /// The samples before `end`, those before the window too, and those at which the drive changes.
+    pub fn steps(&self, end: usize) -> &[usize] {
+        &self.steps[..self.steps.partition_point(|step| *step < end)]
     }
 
     /// The samples from one to before another, and how many each is in place of.

@@ -38,11 +38,17 @@ impl Walk<'_, '_> {
     pub fn at(&mut self, k: usize) -> &[f64] {
         let width = self.path.signals.len();
         if let Some(kept) = &self.kept {
-            return &kept[k * width..][..width];
+            return &kept[self.level(k) * width..][..width];
         }
         let record = &self.fit.common.records[self.r];
         self.fit.push(&mut self.path, record.drive.u[k], record.step(k));
         &self.path.signals
+    }
+
+    /// How many times the drive has changed up to sample `k`: with it, the signals change.
+    #[inline(always)]
+    pub fn level(&self, k: usize) -> usize {
+        self.fit.common.levels[self.r][k]
     }
 }
 
@@ -50,14 +56,14 @@ impl<'a> Fit<'a> {
     /// The way of record `r` from its first sample on.
     pub fn walk<'f>(&'f self, r: usize) -> Walk<'f, 'a> {
         let walk = || Walk { fit: self, r, path: self.before(r), kept: None };
-        let samples = self.common.records[r].drive.u.len();
-        let count = samples * self.signals.count();
+        let levels = &self.common.levels[r];
+        let count = levels.last().map_or(0, |last| last + 1) * self.signals.count();
         if count > MOST_KEPT {
             return walk();
         }
         let make = || {
             let (mut walk, mut all) = (walk(), Vec::with_capacity(count));
-            for k in 0..samples {
+            for k in (0..levels.len()).filter(|&k| k == 0 || levels[k] != levels[k - 1]) {
                 all.extend_from_slice(walk.at(k));
             }
             all.into()
@@ -115,8 +121,13 @@ impl<'a> Fit<'a> {
         let creep = Stepped::new(creep, drive.dt, strides.gaps());
         let mut followers: Vec<Follower> =
             inputs.iter().map(|input| Follower::at_rest(&creep.part, *input, &[])).collect();
+        let levels = &self.common.levels[r];
+        let mut level = 0;
         for (place, &k) in strides.places().iter().enumerate().skip(1) {
-            take(&mut inputs, k);
+            if levels[k] != level {
+                take(&mut inputs, k);
+                level = levels[k];
+            }
             let flow = creep.over(strides.step(place));
             for (follower, input) in followers.iter_mut().zip(&inputs) {
                 follower.next(&creep.part, flow, drive.hold.until(k), *input);
@@ -166,8 +177,11 @@ impl<'a> Fit<'a> {
         let creep = self.creep_before(r, 1);
         let mut follower: Option<Follower> = None;
         let mut motion = Vec::with_capacity(end);
+        let (mut level, mut output) = (usize::MAX, 0.0);
         for (place, &k) in strides.places().iter().enumerate() {
-            let output = self.bent(self.sum(walk.at(k)));
+            if walk.level(k) != level {
+                (level, output) = (walk.level(k), self.bent(self.sum(walk.at(k))));
+            }
             let x = match &mut follower {
                 Some(follower) => {
                     let flow = whole.over(strides.step(place));

@@ -19,23 +19,18 @@ impl Strides {
     /// Those of record `r` before sample `end`.
     pub fn of(fit: &Fit<'_>, r: usize, end: usize) -> Self {
         let record = &fit.common.records[r];
-        let u = record.drive.u;
         if fit.judged[r].is_all() || record.drive.hold != Hold::Zero {
             return Self { places: (0..end).collect(), gaps: vec![1], steps: vec![0; end] };
         }
-        let changes = |k: usize| k == 0 || u[k].to_bits() != u[k - 1].to_bits();
-        let mut needed: Vec<bool> = (0..end).map(|k| changes(k) || k + 1 == end).collect();
         // Also in the warm-up and where readings are left out, or a step would be of any length.
-        for (k, _) in fit.judged[r].within(0, end) {
-            needed[k] = true;
-        }
+        let mut places = fit.judged[r].steps(end).to_vec();
+        places.extend(end.checked_sub(1));
         let late = Late::new(fit.delay(r), record.drive.dt);
-        let read_late = !late.is_none() || !fit.own(r).delay.is_empty();
-        for (k, _) in fit.judged(r).filter(|_| read_late) {
-            let (before, after) = late.between(k);
-            (needed[before], needed[after]) = (true, true);
+        if !late.is_none() || !fit.own(r).delay.is_empty() {
+            places.extend(fit.judged(r).flat_map(|(k, _)| <[usize; 2]>::from(late.between(k))));
         }
-        let places: Vec<usize> = (0..end).filter(|k| needed[*k]).collect();
+        places.sort_unstable();
+        places.dedup();
         let between = |i: usize| if i == 0 { 1 } else { places[i] - places[i - 1] };
         let each: Vec<usize> = (0..places.len()).map(between).collect();
         let mut gaps = each.clone();
