@@ -39,6 +39,8 @@ FIRST, REVERSED = 1500, 0.1
 # record, and ratio of its residual to that of the beginning, or of that and the noise, that ends
 # this.
 ALIKE, TRIED, APART = 1.1, 3, 1.5
+# A residual of so many times the noise has hardly anything but noise in it.
+NOISY = 1.05
 # Fits with a voltage of rest that was found from the one before, at most.
 ROUNDS = 3
 # Share of the stroke below which a residual is no motion, but what a search leaves.
@@ -85,7 +87,12 @@ def rest_of(fit: Identification) -> Rest | None:
     return None if fit.start is None else fit.start.rest
 
 
-def with_rest(problem: Problem, identify: Identify, known: Rest | None = None) -> Identification:
+def with_rest(
+    problem: Problem,
+    identify: Identify,
+    known: Rest | None = None,
+    shown: Structure | None = None,
+) -> Identification:
     """Identify a stage that was at rest until the drive jumped to the first sample.
 
     At rest at a voltage, or at another one where that lowers the residual by 2 %. The drive jumps
@@ -100,6 +107,8 @@ def with_rest(problem: Problem, identify: Identify, known: Rest | None = None) -
     known : Rest, optional
         Rest that another fit has shown, about whose voltage it is searched; 0 V, and a grid where
         that is far off, without.
+    shown : Structure, optional
+        Structure of a fit without a jump: the one with it where that leaves nothing but noise.
 
     Returns
     -------
@@ -118,6 +127,10 @@ def with_rest(problem: Problem, identify: Identify, known: Rest | None = None) -
     kinds = (False,) if data.hold == "zoh" else (False, True)
     if known is not None:
         return _nearer(problem, identify, _at_rest(problem, identify, known))
+    if shown is not None:
+        fit = _at_rest(problem, identify, Rest(0.0), shown)
+        if fit.cost < NOISY * min(fit.noises):
+            return fit
     fit = _at_rest(problem, identify, Rest(0.0))
     for within in kinds[1:]:
         if _begins_apart(fit, fit.data):

@@ -44,8 +44,6 @@ __all__ = ["identify_model", "weights_of"]
 # Parts of the time of descents and of a swarm, for the progress: without an earlier motion, and
 # with it.
 HISTORIES, SWARM = (2.0, 1.0), (9.0, 1.0)
-# A residual of so many times the noise has hardly anything but noise in it.
-NOISY = 1.05
 
 
 def identify_model(
@@ -91,24 +89,11 @@ def identify_model(
         def with_drift(fit: Identification, search: Solve) -> Identification:
             return with_drift_tried(other, fit, search) if isinstance(method, Descents) else fit
 
-        def least_at_rest(moving: Identification | None) -> Identification:
-            if moving is None or start is not None or not isinstance(method, LeastSquares):
-                return with_rest(other, plain, rest)
-            # From the structure without the jump, and anew where that leaves more than noise.
-            shown = Structure.of(moving)
-            fit = with_rest(other, lambda one, begun=None: plain(one, begun or shown), rest)
-            if fit.cost >= (1.0 - GAIN) * moving.cost:
-                return fit
-            anew = None
-            if fit.cost < NOISY * min(fit.noises):
-                anew = Structure.of(fit, kept=True)
-            return with_rest(other, lambda one, begun=None: plain(one, begun or anew), rest_of(fit))
-
-        def at_rest(moving: Identification | None = None) -> Identification:
-            fit = least_at_rest(moving)
+        def at_rest(shown: Structure | None = None) -> Identification:
+            fit = with_rest(other, plain, rest, shown)
             # From the voltage of rest that the exponent 1 shows: each fit takes longer.
-            shown = rest_of(fit)
-            fit = with_drift(fit, lambda one: with_rest(one, plain, shown))
+            known = rest_of(fit)
+            fit = with_drift(fit, lambda one: with_rest(one, plain, known))
             if not may_have_exponent(other, fit):
                 return fit
             drifting = with_drifts(other, drifts_of(fit))
@@ -120,8 +105,11 @@ def identify_model(
         fit = with_drift(plain(other), plain)
         fit = _with_exponent(with_drifts(other, drifts_of(fit)), fit, method, run)
         # What is worse than another model without a jump lacks more than that.
-        worse = start is not None and fit.cost > start.cost
-        return fit if worse or len(other.records) > 1 else with_rest_tried(other, fit, partial(at_rest, fit))
+        if len(other.records) > 1 or (start is not None and fit.cost > start.cost):
+            return fit
+        first = start is None and isinstance(method, LeastSquares)
+        shown = Structure.of(fit, kept=True) if first else None
+        return with_rest_tried(other, fit, partial(at_rest, shown))
 
     def identify(other: Problem, start: Structure | None, rest: Rest | None) -> Identification:
         fit = still(other, start, rest)

@@ -166,6 +166,17 @@ impl Spectra {
         both / index(self.size)
     }
 
+    /// Variance of each value under a noise.
+    fn variances(&self, noise: &Autoregression) -> Vec<f64> {
+        let density = |k: usize| self.share(k) * noise.density(index(k) / index(self.size));
+        let weights: Vec<f64> = (0..=self.size / 2).map(density).collect();
+        let of = |spectrum: &Vec<(f64, f64)>| {
+            let powers = spectrum.iter().map(|(re, im)| re * re + im * im);
+            powers.zip(&weights).map(|(power, weight)| power * weight).sum()
+        };
+        self.values.iter().map(of).collect()
+    }
+
     /// Covariance of the values under a noise.
     fn covariance(&self, noise: &Autoregression) -> DMatrix<f64> {
         let (count, lines) = (self.values.len(), self.size / 2 + 1);
@@ -248,16 +259,19 @@ fn shifts(
     }
     let inverse = Inverse::of(&square).matrix;
     let moved = &inverse * slope - steps;
-    let mut spread = matrix * LEAST;
+    let mut spread: Vec<f64> = (0..count).map(|i| matrix[(i, i)] * LEAST).collect();
     for (columns, one) in weighted.iter().zip(projected) {
         let mut difference = &one.columns * b * -one.weight;
         for (mut of, column) in difference.column_iter_mut().zip((columns * &inverse).column_iter())
         {
             of += DVector::from_vec(one.sieve.noise.reversed_innovations(column.as_slice()));
         }
-        spread += Spectra::of(&difference).covariance(&one.sieve.noise);
+        let variances = Spectra::of(&difference).variances(&one.sieve.noise);
+        for (sum, variance) in spread.iter_mut().zip(variances) {
+            *sum += variance;
+        }
     }
-    (0..count).map(|i| (moved[i], spread[(i, i)].max(0.0).sqrt())).collect()
+    (0..count).map(|i| (moved[i], spread[i].max(0.0).sqrt())).collect()
 }
 
 #[cfg(test)]
