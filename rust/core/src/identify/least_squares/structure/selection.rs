@@ -33,7 +33,9 @@ const FEW_SHAPE_ROUNDS: usize = 4;
 /// middle of its range: what a record does not determine is not changed.
 const SHAPE_GAIN: f64 = 0.1;
 
-/// How far a mode that no record shows is above the drive.
+/// Steps of each beginning of a mode that no record shows, the best of which is settled; and how far
+/// it is above the drive.
+const FEW_STEPS: usize = 15;
 const ABOVE_DRIVE: f64 = 10.0;
 
 /// Share of the deviation that dead zones in other places have to take away.
@@ -442,7 +444,7 @@ fn unseen_mode<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
     let trials = with_each(&beginnings, |(frequency, damping_ratio)| {
         let mut trial = fit.clone();
         trial.set_poles(Form::Modes(1), &[libm::log(frequency / dt), libm::log(*damping_ratio)]);
-        trial.settle_rigid(STEPS)?;
+        trial.settle_rigid(FEW_STEPS)?;
         Some(trial)
     })?;
     let better =
