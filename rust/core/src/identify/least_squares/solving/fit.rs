@@ -4,7 +4,7 @@ use core::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use super::form::Form;
-use super::judged::Judged;
+use super::judged::{Judged, Reading};
 use super::layout::{Layout, Own};
 use crate::error::{Error, Result};
 use crate::identify::least_squares::common::Common;
@@ -311,19 +311,15 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// Samples of a record that are judged.
-    pub fn judged(&self, r: usize) -> impl Iterator<Item = (usize, f64)> {
-        let (record, window) = (self.common.records[r], &self.windows[r]);
-        let weight = self.common.weights[r];
-        let judged = self.judged[r].within(window.start, window.end);
-        judged
-            .filter(move |(k, _)| record.counts(*k))
-            .map(move |(k, share)| (k, weight * index(share)))
+    /// Readings of a record that are judged.
+    pub fn judged(&self, r: usize) -> &[Reading] {
+        self.judged[r].within(&self.windows[r])
     }
 
     /// Samples that are judged, each as often as it counts.
     pub fn counted(&self) -> f64 {
-        (0..self.windows.len()).flat_map(|r| self.judged(r)).map(|(_, weight)| weight).sum()
+        let of = |r: usize| self.judged(r).iter().map(|one| one.share).sum::<f64>();
+        (0..self.windows.len()).map(|r| self.common.weights[r] * of(r)).sum()
     }
 
     /// RMS deviation in the windows, m.
@@ -332,8 +328,8 @@ impl<'a> Fit<'a> {
         let (mut sum, mut count) = (0.0, 0.0);
         for r in 0..self.common.records.len() {
             let Ok((squares, counted)) = self.squares(r) else { return f64::INFINITY };
-            sum += squares;
-            count += counted;
+            sum += self.common.weights[r] * squares;
+            count += self.common.weights[r] * counted;
         }
         libm::sqrt(sum / count)
     }
@@ -343,15 +339,14 @@ impl<'a> Fit<'a> {
         self.squares(r).map_or(f64::INFINITY, |(sum, count)| libm::sqrt(sum / count))
     }
 
-    /// Sum of the squares of the deviations of a record, each as often as it counts, and of these.
+    /// Sum of the squares of the deviations of a record, and how many.
     fn squares(&self, r: usize) -> Result<(f64, f64)> {
         let (motion, added) = (self.motion(r)?, self.added(r));
-        let y = self.common.records[r].y;
         let (mut sum, mut count) = (0.0, 0.0);
-        for (k, weight) in self.judged(r) {
-            let error = y[k] - motion[k] - added(k);
-            sum += weight * error * error;
-            count += weight;
+        for &Reading { place, share, y, scatter } in self.judged(r) {
+            let error = y - motion[place] - added(place);
+            sum += share * error * error + scatter;
+            count += share;
         }
         Ok((sum, count))
     }

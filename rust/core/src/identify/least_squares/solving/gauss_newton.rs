@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 
 use super::columns::Columns;
 use super::fit::Fit;
+use super::judged::Reading;
 use super::late::Late;
 use crate::error::Result;
 use crate::identify::least_squares::settings::{ROUGH, STEPS};
@@ -78,7 +79,7 @@ impl Fit<'_> {
 
     /// The solution of the problem linearised about the present unknowns.
     fn goal(&self) -> Goal {
-        let Ok((mut rows, before)) = self.linearised() else {
+        let Ok((mut rows, before, scatter)) = self.linearised() else {
             let none = f64::INFINITY;
             return Goal { x: self.x.clone(), rms: none, before: none, free: false };
         };
@@ -108,7 +109,8 @@ impl Fit<'_> {
         let corners = moving(self.rigid, layout.corners());
         let mut stops = corners.chain(moving(self.held, layout.poles()));
         let free = stops.all(|slot| bounds[slot].0 < x[slot] && x[slot] < bounds[slot].1);
-        Goal { rms: rows.rms(&x, self.counted()), x, before, free }
+        let rms = libm::hypot(rows.rms(&x, self.counted()), scatter);
+        Goal { rms, x, before, free }
     }
 
     /// Bounds of all unknowns for a step.
@@ -128,8 +130,8 @@ impl Fit<'_> {
         bounds
     }
 
-    /// The rows of the linearised problem, and the RMS deviation, m.
-    fn linearised(&self) -> Result<(Rows, f64)> {
+    /// The rows of the linearised problem, the RMS deviation, and that of readings from their means, m.
+    fn linearised(&self) -> Result<(Rows, f64, f64)> {
         self.common.count(1);
         let mut rows = Rows::new(self.unknowns());
         let mut squares = 0.0;
@@ -137,7 +139,13 @@ impl Fit<'_> {
             squares += self.push_rows(r, &mut rows)?;
         }
         self.push_alike(&mut rows);
-        Ok((rows, libm::sqrt(squares / self.counted())))
+        let of = |r: usize| {
+            let scatter = self.judged(r).iter().map(|one| one.scatter).sum::<f64>();
+            self.common.weights[r] * scatter
+        };
+        let scatter: f64 = (0..self.common.records.len()).map(of).sum();
+        let rms = |squares: f64| libm::sqrt(squares / self.counted());
+        Ok((rows, rms(squares + scatter), rms(scatter)))
     }
 
     /// Rows that draw weights of neighbours together where the model asks for it.
@@ -152,7 +160,7 @@ impl Fit<'_> {
 
     /// The rows of one record; the sum of the squares of what is left, each as often as it counts.
     fn push_rows(&self, r: usize, rows: &mut Rows) -> Result<f64> {
-        let WeightsRecord { drive, y, start, .. } = self.common.records[r];
+        let WeightsRecord { drive, start, .. } = self.common.records[r];
         let (layout, own) = (self.layout(), self.own(r));
         let (added, fades) = (self.added(r), self.fading(r));
         let mut columns = Columns::of(self, r)?;
@@ -160,18 +168,18 @@ impl Fit<'_> {
         let late = Late::new(self.delay(r), drive.dt);
         let mut recent = Recent::new(columns.count(), late);
         let mut row = vec![0.0; self.unknowns()];
-        let mut judged = self.judged(r).peekable();
+        let mut judged = self.judged(r).iter().peekable();
         let mut motion = Vec::with_capacity(self.windows[r].end);
         let mut squares = 0.0;
         while let Some(places) = columns.next() {
             for (i, k) in places.into_iter().enumerate() {
                 motion.resize(k, motion.last().copied().unwrap_or_default());
                 motion.push(exact.as_ref().map_or(columns.displacement(i), |exact| exact[k]));
-                let counts = judged.next_if(|(place, _)| *place == k);
+                let counts = judged.next_if(|one| one.place == k);
                 if !late.is_none() {
                     recent.push(k, columns.row(i));
                 }
-                let Some((_, weight)) = counts else { continue };
+                let Some(&Reading { share, y, .. }) = counts else { continue };
                 if late.is_none() {
                     let (stage, departures) = columns.row(i).split_at(layout.count());
                     row[..layout.count()].copy_from_slice(stage);
@@ -185,8 +193,8 @@ impl Fit<'_> {
                 let (before, after) = late.between(k);
                 row[own.delay.clone()].fill((motion[before] - motion[after]) / drive.dt);
                 let known: f64 = row.iter().zip(&self.x).map(|(a, b)| a * b).sum();
-                let factor = libm::sqrt(weight);
-                let left = factor * (y[k] - late.of(k, |k| motion[k]) - added(k));
+                let factor = libm::sqrt(self.common.weights[r] * share);
+                let left = factor * (y - late.of(k, |k| motion[k]) - added(k));
                 squares += left * left;
                 for entry in &mut row {
                     *entry *= factor;

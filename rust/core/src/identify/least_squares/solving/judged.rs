@@ -1,96 +1,116 @@
 //! Samples of a record that are judged.
 
+use core::ops::Range;
 use std::sync::Arc;
 
 use crate::identify::least_squares::weights_record::WeightsRecord;
+use crate::signal::index;
 
 /// Samples since the drive last changed for each by which the next one that is judged is further
 /// away: what a stage does after a change slows down as it fades, in creep as the logarithm of time.
 const SINCE_CHANGE: usize = 50;
 
-/// Samples of a record that are judged, each in place of those up to the next one.
-///
-/// Those before the window are where a step of the motion ends.
+/// What is read at a sample in place of those up to the next one that is judged.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::identify::least_squares) struct Reading {
+    pub place: usize,
+    /// How many samples it is in place of.
+    pub share: f64,
+    /// Displacement, m: of those since which the drive has stayed for long, the mean.
+    pub y: f64,
+    /// Sum of the squares of the deviations from that mean, m^2.
+    pub scatter: f64,
+}
+
+/// Samples of a record that are judged.
 #[derive(Clone, Debug)]
 pub(in crate::identify::least_squares) struct Judged {
-    places: Arc<[usize]>,
-    /// These, and the samples at which the drive changes.
-    steps: Arc<[usize]>,
-    end: usize,
+    readings: Arc<[Reading]>,
+    /// Their samples, those before the window and left out too, and those at which the drive changes;
+    /// `None` for all.
+    steps: Option<Arc<[usize]>>,
 }
 
 impl Judged {
     /// All samples.
     pub fn all(record: &WeightsRecord<'_>) -> Self {
-        let end = record.y.len();
-        let places: Arc<[usize]> = (0..end).collect();
-        Self { steps: places.clone(), places, end }
+        let read = |place: usize| mean(record, place, place..place + 1);
+        Self { readings: (0..record.y.len()).filter_map(read).collect(), steps: None }
     }
 
     /// About so many of the window at most: every so many, and fewer the longer the drive has stayed.
     pub fn thinned(record: &WeightsRecord<'_>, most: usize) -> Self {
-        let of = |every| Self::every(record, every);
         let mut every = 1;
-        let mut judged = of(every);
-        while judged.count(record.start) > most {
-            every = (every + 1).max(every * judged.count(record.start) / most);
-            judged = of(every);
+        loop {
+            let judged = Self::every(record, every);
+            let count = judged.readings.len() - judged.before(record.start);
+            if count <= most {
+                return judged;
+            }
+            every = (every + 1).max(every * count / most);
         }
-        judged
     }
 
     fn every(record: &WeightsRecord<'_>, every: usize) -> Self {
         let end = record.y.len();
-        let (mut places, mut steps) = (Vec::new(), Vec::new());
-        let (mut place, mut changed) = (0, 0);
-        while place < end {
-            places.push(place);
-            steps.push(place);
-            let longest = even((place - changed) / SINCE_CHANGE).max(every);
-            let mut next = place;
+        let (mut readings, mut steps) = (Vec::new(), Vec::new());
+        let (mut begin, mut changed) = (0, 0);
+        while begin < end {
+            let longest = even((begin - changed) / SINCE_CHANGE).max(every);
+            let mut next = begin;
+            let mut changes = Vec::new();
             loop {
                 next += 1;
                 // The reading at a change is the last one before what follows from it.
                 if next < end && record.changes(next) {
                     changed = next;
                 }
-                let moved = changed > place && next >= place + every;
-                if moved || next == place + longest || next == record.start {
+                let moved = changed > begin && next >= begin + every;
+                if moved || next == begin + longest || next == record.start || next == end {
                     break;
                 }
                 if changed == next {
-                    steps.push(next);
+                    changes.push(next);
                 }
             }
-            place = next;
+            let (place, samples) = if longest > every && changes.is_empty() {
+                (begin + (next - begin) / 2, begin..next)
+            } else {
+                (begin, begin..begin + 1)
+            };
+            let share = index(next - begin) / index(samples.len());
+            let read = mean(record, place, samples);
+            readings.extend(read.map(|one| Reading { share: share * one.share, ..one }));
+            steps.push(place);
+            steps.append(&mut changes);
+            begin = next;
         }
-        Self { places: places.into(), steps: steps.into(), end }
+        let all = every == 1 && steps.len() == end;
+        Self { readings: readings.into(), steps: (!all).then(|| steps.into()) }
     }
 
-    /// Samples of a window that begins at `start`.
-    fn count(&self, start: usize) -> usize {
-        self.places.len() - self.places.partition_point(|place| *place < start)
+    /// The samples before `end` at which the motion is needed; `None` for all.
+    pub fn steps(&self, end: usize) -> Option<&[usize]> {
+        self.steps.as_ref().map(|steps| &steps[..steps.partition_point(|step| *step < end)])
     }
 
-    /// Whether all samples are judged.
-    pub fn is_all(&self) -> bool {
-        self.places.len() == self.end
+    /// The readings of a part of the record.
+    pub fn within(&self, part: &Range<usize>) -> &[Reading] {
+        &self.readings[self.before(part.start)..self.before(part.end)]
     }
 
-    /// The samples before `end`, those before the window too, and those at which the drive changes.
-    pub fn steps(&self, end: usize) -> &[usize] {
-        &self.steps[..self.steps.partition_point(|step| *step < end)]
+    fn before(&self, end: usize) -> usize {
+        self.readings.partition_point(|one| one.place < end)
     }
+}
 
-    /// The samples from one to before another, and how many each is in place of.
-    pub fn within(&self, from: usize, to: usize) -> impl Iterator<Item = (usize, usize)> {
-        let first = self.places.partition_point(|place| *place < from);
-        let last = self.places.partition_point(|place| *place < to);
-        (first..last).map(|i| {
-            let next = self.places.get(i + 1).copied().unwrap_or(self.end);
-            (self.places[i], next - self.places[i])
-        })
-    }
+/// The mean of those of some samples that count, as read at a place; `None` where none does.
+fn mean(record: &WeightsRecord<'_>, place: usize, samples: Range<usize>) -> Option<Reading> {
+    let counted = || samples.clone().filter(|k| record.counts(*k)).map(|k| record.y[k]);
+    let share = index(counted().count());
+    let y = if samples.len() == 1 { record.y[place] } else { counted().sum::<f64>() / share };
+    let scatter = counted().map(|one| (one - y) * (one - y)).sum();
+    (share > 0.0).then_some(Reading { place, share, y, scatter })
 }
 
 /// A number with two digits that are not 0 in binary: few different steps.
@@ -102,7 +122,7 @@ fn even(number: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::{Judged, even};
+    use super::{Judged, Reading, even};
     use crate::identify::least_squares::weights_record::WeightsRecord;
     use crate::signal::{Drive, Hold, index};
 
@@ -115,11 +135,13 @@ mod tests {
     fn a_drive_that_moves_is_judged_at_even_distances_from_the_start_on() {
         let u: Vec<f64> = (0..1000).map(|k| libm::sin(0.1 * index(k))).collect();
         let judged = judged(&u, 207, 200);
-        let shares: Vec<_> = judged.within(207, 1000).collect();
-        assert_eq!(shares[0].0, 207);
-        assert!(shares.len() <= 200);
-        assert!(shares.iter().rev().skip(1).all(|(_, share)| *share == shares[0].1));
-        assert_eq!(shares.iter().map(|(_, share)| share).sum::<usize>(), 793);
+        let readings = judged.within(&(207..1000));
+        assert_eq!(readings[0].place, 207);
+        assert!(readings.len() <= 200);
+        let (last, others) = readings.split_last().unwrap_or((&readings[0], readings));
+        assert!(others.iter().all(|one| one.share == readings[0].share));
+        assert!(readings.iter().all(|one| one.y == u[one.place] && one.scatter == 0.0));
+        assert_eq!(others.iter().map(|one| one.share).sum::<f64>() + last.share, 793.0);
     }
 
     #[test]
@@ -128,11 +150,30 @@ mod tests {
         let u: Vec<f64> = (0..9000).map(|k| levels[k / 3000]).collect();
         let judged = judged(&u, 0, 2000);
         for jump in [3000, 6000] {
-            let shares: Vec<_> = judged.within(jump, jump + 3000).collect();
-            assert!(shares.iter().take(50).enumerate().all(|(i, one)| *one == (jump + i, 1)));
-            assert!(shares.windows(2).rev().skip(1).all(|pair| pair[0].1 <= pair[1].1));
-            assert!(shares.len() < 400 && shares.iter().map(|one| one.1).sum::<usize>() == 3000);
+            let readings = judged.within(&(jump..jump + 3000));
+            let first = readings.iter().take(50).enumerate();
+            assert!(first.into_iter().all(|(i, one)| (one.place, one.share) == (jump + i, 1.0)));
+            assert!(readings.windows(2).rev().skip(1).all(|pair| pair[0].share <= pair[1].share));
+            assert!(readings.len() < 400);
+            assert_eq!(readings.iter().map(|one| one.share).sum::<f64>(), 3000.0);
         }
+    }
+
+    #[test]
+    fn means_have_all_of_the_squares() {
+        let u: Vec<f64> = (0..2000).map(|k| if k < 1000 { 0.0 } else { 9.0 }).collect();
+        let y: Vec<f64> = (0..2000).map(|k| libm::sin(index(k * k))).collect();
+        let left_out: Vec<bool> = (0..2000).map(|k| k % 7 == 0 && k > 1500).collect();
+        let drive = Drive { u: &u, dt: 1e-3, hold: Hold::Zero };
+        let record = WeightsRecord { left_out: &left_out, ..WeightsRecord::of(drive, &y, 0) };
+        let squares = |judged: &Judged| {
+            let of = |one: &Reading| one.share * one.y * one.y + one.scatter;
+            judged.within(&(0..2000)).iter().map(of).sum::<f64>()
+        };
+        let (all, some) = (Judged::all(&record), Judged::thinned(&record, 1000));
+        assert!(some.within(&(0..2000)).len() < 600);
+        // Where one left out is read alone, those up to the next are left out with it.
+        assert!((squares(&some) / squares(&all) - 1.0).abs() < 0.01);
     }
 
     #[test]

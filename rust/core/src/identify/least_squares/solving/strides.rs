@@ -1,6 +1,7 @@
 //! Samples of a record at which its motion is computed, and the steps between them.
 
 use super::fit::Fit;
+use super::judged::Reading;
 use super::late::Late;
 use crate::models::{Relaxation, RelaxationFlow};
 use crate::signal::{Hold, index};
@@ -19,15 +20,17 @@ impl Strides {
     /// Those of record `r` before sample `end`.
     pub fn of(fit: &Fit<'_>, r: usize, end: usize) -> Self {
         let record = &fit.common.records[r];
-        if fit.judged[r].is_all() || record.drive.hold != Hold::Zero {
+        let steps = fit.judged[r].steps(end).filter(|_| record.drive.hold == Hold::Zero);
+        let Some(steps) = steps else {
             return Self { places: (0..end).collect(), gaps: vec![1], steps: vec![0; end] };
-        }
+        };
         // Also in the warm-up and where readings are left out, or a step would be of any length.
-        let mut places = fit.judged[r].steps(end).to_vec();
+        let mut places = steps.to_vec();
         places.extend(end.checked_sub(1));
         let late = Late::new(fit.delay(r), record.drive.dt);
         if !late.is_none() || !fit.own(r).delay.is_empty() {
-            places.extend(fit.judged(r).flat_map(|(k, _)| <[usize; 2]>::from(late.between(k))));
+            let read = |one: &Reading| <[usize; 2]>::from(late.between(one.place));
+            places.extend(fit.judged(r).iter().flat_map(read));
         }
         places.sort_unstable();
         places.dedup();
@@ -126,7 +129,7 @@ mod tests {
             fit.x[layout.weights()].fill(0.3);
             fit.x[layout.creep_weights()].fill(0.1);
             fit.x[own.delay].fill(3.4e-3);
-            Ok((fit.motion(0)?, fit.judged(0).map(|(k, _)| k).collect()))
+            Ok((fit.motion(0)?, fit.judged(0).iter().map(|one| one.place).collect()))
         })
     }
 
