@@ -160,8 +160,8 @@ impl<'f, 'a> Columns<'f, 'a> {
         for (i, &k) in places.iter().enumerate() {
             let from = i * self.width;
             if self.walk.level(k) == level {
-                self.inputs
-                    .copy_within(from - self.width..from - self.width + self.inner + 1, from);
+                let before = from - self.width;
+                self.inputs.copy_within(before..=before + self.inner, from);
             } else {
                 level = self.walk.level(k);
                 self.fit.inputs(self.walk.at(k), &mut self.inputs[from..=from + self.inner]);

@@ -110,7 +110,7 @@ impl Fit<'_> {
         let mut stops = corners.chain(moving(self.held, layout.poles()));
         let free = stops.all(|slot| bounds[slot].0 < x[slot] && x[slot] < bounds[slot].1);
         let rms = libm::hypot(rows.rms(&x, self.counted()), scatter);
-        Goal { rms, x, before, free }
+        Goal { x, rms, before, free }
     }
 
     /// Bounds of all unknowns for a step.
