@@ -4,11 +4,15 @@ use core::ops::Range;
 use std::sync::Arc;
 
 use crate::identify::least_squares::weights_record::WeightsRecord;
-use crate::signal::index;
+use crate::signal::{index, sample_noise};
 
 /// Samples since the drive last changed for each by which the next one that is judged is further
 /// away: what a stage does after a change slows down as it fades, in creep as the logarithm of time.
 const SINCE_CHANGE: usize = 50;
+
+/// Variance of the readings about their mean, relative to that of the noise, from which on the stage
+/// still rings: each is judged alone.
+const RINGS: f64 = 4.0;
 
 /// What is read at a sample in place of those up to the next one that is judged.
 #[derive(Clone, Copy, Debug)]
@@ -40,9 +44,10 @@ impl Judged {
 
     /// About so many of the window at most: every so many, and fewer the longer the drive has stayed.
     pub fn thinned(record: &WeightsRecord<'_>, most: usize) -> Self {
+        let noise = sample_noise(&record.y[record.start..]);
         let mut every = 1;
         loop {
-            let judged = Self::every(record, every);
+            let judged = Self::every(record, every, noise);
             let count = judged.readings.len() - judged.before(record.start);
             if count <= most {
                 return judged;
@@ -51,7 +56,7 @@ impl Judged {
         }
     }
 
-    fn every(record: &WeightsRecord<'_>, every: usize) -> Self {
+    fn every(record: &WeightsRecord<'_>, every: usize, noise: f64) -> Self {
         let end = record.y.len();
         let (mut readings, mut steps) = (Vec::new(), Vec::new());
         let (mut begin, mut changed) = (0, 0);
@@ -73,15 +78,21 @@ impl Judged {
                     changes.push(next);
                 }
             }
-            let (place, samples) = if longest > every && changes.is_empty() {
+            let stays = longest > every && changes.is_empty();
+            let (place, samples) = if stays {
                 (begin + (next - begin) / 2, begin..next)
             } else {
                 (begin, begin..begin + 1)
             };
-            let share = index(next - begin) / index(samples.len());
-            let read = mean(record, place, samples);
-            readings.extend(read.map(|one| Reading { share: share * one.share, ..one }));
-            steps.push(place);
+            let read = mean(record, place, samples.clone());
+            if read.is_some_and(|one| one.scatter > RINGS * noise * noise * (one.share - 1.0)) {
+                readings.extend(samples.clone().filter_map(|k| mean(record, k, k..k + 1)));
+                steps.extend(samples);
+            } else {
+                let share = index(next - begin) / index(samples.len());
+                readings.extend(read.map(|one| Reading { share: share * one.share, ..one }));
+                steps.push(place);
+            }
             steps.append(&mut changes);
             begin = next;
         }
@@ -180,6 +191,21 @@ mod tests {
         assert!(some.within(&(0..2000)).len() < 600);
         // Where one left out is read alone, those up to the next are left out with it.
         assert!((squares(&some) / squares(&all) - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn what_still_rings_is_judged_sample_by_sample() {
+        let u: Vec<f64> = (0..2000).map(|k| if k < 1000 { 0.0 } else { 9.0 }).collect();
+        let noise = |k: usize| 0.01 * libm::sin(index(k * k));
+        let rings = |k: usize| {
+            let since = index(k.saturating_sub(1000));
+            u[k] * (1.0 - libm::exp(-since / 100.0) * libm::cos(0.9 * since))
+        };
+        let y: Vec<f64> = (0..2000).map(|k| rings(k) + noise(k)).collect();
+        let drive = Drive { u: &u, dt: 1e-3, hold: Hold::Zero };
+        let judged = Judged::thinned(&WeightsRecord::of(drive, &y, 0), 2000);
+        assert!(judged.within(&(1000..1400)).iter().all(|one| one.share < 1.5));
+        assert!(judged.within(&(1800..2000)).len() < 50);
     }
 
     #[test]
