@@ -14,7 +14,7 @@ const SINCE_CHANGE: usize = 50;
 /// still rings: each is judged alone.
 const RINGS: f64 = 4.0;
 
-/// What is read at a sample in place of those up to the next one that is judged.
+/// A reading, in place of those up to the next one that is judged.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::identify::least_squares) struct Reading {
     pub place: usize,
