@@ -312,13 +312,13 @@ impl<'a> Fit<'a> {
     }
 
     /// Readings of a record that are judged.
-    pub fn judged(&self, r: usize) -> &[Reading] {
+    pub fn judged(&self, r: usize) -> impl Iterator<Item = &Reading> + Clone {
         self.judged[r].within(&self.windows[r])
     }
 
     /// Samples that are judged, each as often as it counts.
     pub fn counted(&self) -> f64 {
-        let of = |r: usize| self.judged(r).iter().map(|one| one.share).sum::<f64>();
+        let of = |r: usize| self.judged(r).map(|one| one.share).sum::<f64>();
         (0..self.windows.len()).map(|r| self.common.weights[r] * of(r)).sum()
     }
 

@@ -140,7 +140,7 @@ impl Fit<'_> {
         }
         self.push_alike(&mut rows);
         let of = |r: usize| {
-            let scatter = self.judged(r).iter().map(|one| one.scatter).sum::<f64>();
+            let scatter = self.judged(r).map(|one| one.scatter).sum::<f64>();
             self.common.weights[r] * scatter
         };
         let scatter: f64 = (0..self.common.records.len()).map(of).sum();
@@ -168,7 +168,7 @@ impl Fit<'_> {
         let late = Late::new(self.delay(r), drive.dt);
         let mut recent = Recent::new(columns.count(), late);
         let mut row = vec![0.0; self.unknowns()];
-        let mut judged = self.judged(r).iter().peekable();
+        let mut judged = self.judged(r).peekable();
         let mut motion = Vec::with_capacity(self.windows[r].end);
         let mut squares = 0.0;
         while let Some(places) = columns.next() {

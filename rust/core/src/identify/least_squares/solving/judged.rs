@@ -30,6 +30,8 @@ pub(in crate::identify::least_squares) struct Reading {
 #[derive(Clone, Debug)]
 pub(in crate::identify::least_squares) struct Judged {
     readings: Arc<[Reading]>,
+    /// Every how many of these are judged, from the begin of a window on.
+    every: usize,
     /// Their samples, those before the window and left out too, and those at which the drive changes;
     /// `None` for all.
     steps: Option<Arc<[usize]>>,
@@ -38,8 +40,7 @@ pub(in crate::identify::least_squares) struct Judged {
 impl Judged {
     /// All samples.
     pub fn all(record: &WeightsRecord<'_>) -> Self {
-        let read = |place: usize| mean(record, place, place..place + 1);
-        Self { readings: (0..record.y.len()).filter_map(read).collect(), steps: None }
+        Self { readings: each(record, 1.0), every: 1, steps: None }
     }
 
     /// About so many of the window at most: every so many, and fewer the longer the drive has stayed.
@@ -48,7 +49,7 @@ impl Judged {
         let mut every = 1;
         loop {
             let judged = Self::every(record, every, noise);
-            let count = judged.readings.len() - judged.before(record.start);
+            let count = judged.within(&(record.start..record.y.len())).count();
             if count <= most {
                 return judged;
             }
@@ -58,7 +59,7 @@ impl Judged {
 
     fn every(record: &WeightsRecord<'_>, every: usize, noise: f64) -> Self {
         let end = record.y.len();
-        let (mut readings, mut steps) = (Vec::new(), Vec::new());
+        let (mut readings, mut steps, mut moves) = (Vec::new(), Vec::new(), true);
         let (mut begin, mut changed) = (0, 0);
         while begin < end {
             let longest = even((begin - changed) / SINCE_CHANGE).max(every);
@@ -79,6 +80,7 @@ impl Judged {
                 }
             }
             let stays = longest > every && changes.is_empty();
+            moves &= !stays;
             let (place, samples) = if stays {
                 (begin + (next - begin) / 2, begin..next)
             } else {
@@ -96,8 +98,16 @@ impl Judged {
             steps.append(&mut changes);
             begin = next;
         }
-        let all = every == 1 && steps.len() == end;
-        Self { readings: readings.into(), steps: (!all).then(|| steps.into()) }
+        if moves {
+            let steps = (every > 1).then(|| steps.into());
+            return Self { readings: each(record, index(every)), every, steps };
+        }
+        Self { readings: readings.into(), every: 1, steps: Some(steps.into()) }
+    }
+
+    /// Whether the drive stays for long.
+    pub fn stays(&self) -> bool {
+        self.every == 1 && self.steps.is_some()
     }
 
     /// The samples before `end` at which the motion is needed; `None` for all.
@@ -106,13 +116,21 @@ impl Judged {
     }
 
     /// The readings of a part of the record.
-    pub fn within(&self, part: &Range<usize>) -> &[Reading] {
-        &self.readings[self.before(part.start)..self.before(part.end)]
+    pub fn within(&self, part: &Range<usize>) -> impl Iterator<Item = &Reading> + Clone {
+        let readings = &self.readings[self.before(part.start)..self.before(part.end)];
+        readings.iter().step_by(self.every).filter(|one| one.share > 0.0)
     }
 
     fn before(&self, end: usize) -> usize {
         self.readings.partition_point(|one| one.place < end)
     }
+}
+
+/// Readings of all samples; those left out are in place of none.
+fn each(record: &WeightsRecord<'_>, share: f64) -> Arc<[Reading]> {
+    let share = |place: usize| if record.counts(place) { share } else { 0.0 };
+    let places = record.y.iter().enumerate();
+    places.map(|(place, &y)| Reading { place, share: share(place), y, scatter: 0.0 }).collect()
 }
 
 /// The mean of those of some samples that count, as read at a place; `None` where none does.
@@ -146,18 +164,16 @@ mod tests {
     fn a_drive_that_moves_is_judged_at_even_distances_from_the_start_on() {
         let u: Vec<f64> = (0..1000).map(|k| libm::sin(0.1 * index(k))).collect();
         let judged = judged(&u, 207, 200);
-        let readings = judged.within(&(207..1000));
+        let readings: Vec<_> = judged.within(&(207..1000)).collect();
         assert_eq!(readings[0].place, 207);
         assert!(readings.len() <= 200);
-        let (last, others) = readings.split_last().unwrap_or((&readings[0], readings));
-        assert!(others.iter().all(|one| one.share.total_cmp(&readings[0].share).is_eq()));
+        assert!(readings.windows(2).all(|pair| (pair[1].place - pair[0].place) == 4));
         assert!(
             readings
                 .iter()
                 .all(|one| one.y.total_cmp(&u[one.place]).is_eq() && one.scatter.abs() < 1e-300)
         );
-        let sum = others.iter().map(|one| one.share).sum::<f64>() + last.share;
-        assert!((sum - 793.0).abs() < 1e-9);
+        assert!(readings.iter().all(|one| (one.share - 4.0).abs() < 1e-9));
     }
 
     #[test]
@@ -166,7 +182,7 @@ mod tests {
         let u: Vec<f64> = (0..9000).map(|k| levels[k / 3000]).collect();
         let judged = judged(&u, 0, 2000);
         for jump in [3000, 6000] {
-            let readings = judged.within(&(jump..jump + 3000));
+            let readings: Vec<_> = judged.within(&(jump..jump + 3000)).collect();
             let first = readings.iter().take(50).enumerate();
             assert!(first.into_iter().all(|(i, one)| one.place == jump + i && one.share < 1.5));
             assert!(readings.windows(2).rev().skip(1).all(|pair| pair[0].share <= pair[1].share));
@@ -185,10 +201,10 @@ mod tests {
         let record = WeightsRecord { left_out: &left_out, ..WeightsRecord::of(drive, &y, 0) };
         let squares = |judged: &Judged| {
             let of = |one: &Reading| one.share * one.y * one.y + one.scatter;
-            judged.within(&(0..2000)).iter().map(of).sum::<f64>()
+            judged.within(&(0..2000)).map(of).sum::<f64>()
         };
         let (all, some) = (Judged::all(&record), Judged::thinned(&record, 1000));
-        assert!(some.within(&(0..2000)).len() < 600);
+        assert!(some.within(&(0..2000)).count() < 600);
         // Where one left out is read alone, those up to the next are left out with it.
         assert!((squares(&some) / squares(&all) - 1.0).abs() < 0.01);
     }
@@ -204,8 +220,8 @@ mod tests {
         let y: Vec<f64> = (0..2000).map(|k| rings(k) + noise(k)).collect();
         let drive = Drive { u: &u, dt: 1e-3, hold: Hold::Zero };
         let judged = Judged::thinned(&WeightsRecord::of(drive, &y, 0), 2000);
-        assert!(judged.within(&(1000..1400)).iter().all(|one| one.share < 1.5));
-        assert!(judged.within(&(1800..2000)).len() < 50);
+        assert!(judged.within(&(1000..1400)).all(|one| one.share < 1.5));
+        assert!(judged.within(&(1800..2000)).count() < 50);
     }
 
     #[test]

@@ -30,7 +30,7 @@ impl Strides {
         let late = Late::new(fit.delay(r), record.drive.dt);
         if !late.is_none() || !fit.own(r).delay.is_empty() {
             let read = |one: &Reading| <[usize; 2]>::from(late.between(one.place));
-            places.extend(fit.judged(r).iter().flat_map(read));
+            places.extend(fit.judged(r).flat_map(read));
         }
         places.sort_unstable();
         places.dedup();
@@ -129,7 +129,7 @@ mod tests {
             fit.x[layout.weights()].fill(0.3);
             fit.x[layout.creep_weights()].fill(0.1);
             fit.x[own.delay].fill(3.4e-3);
-            Ok((fit.motion(0)?, fit.judged(0).iter().map(|one| one.place).collect()))
+            Ok((fit.motion(0)?, fit.judged(0).map(|one| one.place).collect()))
         })
     }
 

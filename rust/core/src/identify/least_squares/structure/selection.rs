@@ -33,9 +33,7 @@ const FEW_SHAPE_ROUNDS: usize = 4;
 /// middle of its range: what a record does not determine is not changed.
 const SHAPE_GAIN: f64 = 0.1;
 
-/// Steps of each beginning of a mode that no record shows, the best of which is settled; and how far
-/// it is above the drive.
-const FEW_STEPS: usize = 15;
+/// How far a mode that no record shows is above the drive.
 const ABOVE_DRIVE: f64 = 10.0;
 
 /// Share of the deviation that dead zones in other places have to take away.
@@ -72,13 +70,20 @@ pub(in crate::identify::least_squares) fn search<'a>(
     common.count(few.evaluations());
     let mut fit = chosen.on(common);
     let kept = settings.start.as_ref().is_none_or(|start| start.kept);
-    let all = core::mem::replace(&mut fit.judged, judged_of(common));
     if kept {
-        fit.settle(1e-4)?;
+        let judged = judged_of(common);
+        if judged.iter().any(Judged::stays) {
+            // The last steps alone need all readings.
+            let all = core::mem::replace(&mut fit.judged, judged);
+            fit.settle(1e-4)?;
+            fit.exact = true;
+            fit.settle(ROUGH)?;
+            fit.judged = all;
+        } else {
+            fit.settle(1e-4)?;
+        }
     }
     fit.exact = true;
-    fit.settle(ROUGH)?;
-    fit.judged = all;
     fit.settle(if kept { 1e-8 } else { ROUGH })?;
     drop_modes(&mut fit)?;
     Some(fit)
@@ -444,7 +449,7 @@ fn unseen_mode<'a>(fit: &Fit<'a>) -> Option<Fit<'a>> {
     let trials = with_each(&beginnings, |(frequency, damping_ratio)| {
         let mut trial = fit.clone();
         trial.set_poles(Form::Modes(1), &[libm::log(frequency / dt), libm::log(*damping_ratio)]);
-        trial.settle_rigid(FEW_STEPS)?;
+        trial.settle_rigid(STEPS)?;
         Some(trial)
     })?;
     let better =
