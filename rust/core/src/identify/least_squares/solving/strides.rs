@@ -28,9 +28,13 @@ impl Strides {
         let mut places = steps.to_vec();
         places.extend(end.checked_sub(1));
         let late = Late::new(fit.delay(r), record.drive.dt);
-        if !late.is_none() || !fit.own(r).delay.is_empty() {
-            let read = |one: &Reading| <[usize; 2]>::from(late.between(one.place));
-            places.extend(fit.judged(r).flat_map(read));
+        let read_late = !late.is_none() || !fit.own(r).delay.is_empty();
+        // A part of the window may begin between two steps.
+        for &Reading { place, .. } in fit.judged(r) {
+            places.push(place);
+            if read_late {
+                places.extend(<[usize; 2]>::from(late.between(place)));
+            }
         }
         places.sort_unstable();
         places.dedup();
@@ -114,10 +118,17 @@ mod tests {
         Ok(())
     }
 
-    /// Motion of plays that creep, read late, and the samples of about so many that are judged.
-    fn motion(u: &[f64], most: usize, lag: &[f64]) -> Result<(Vec<f64>, Vec<usize>)> {
+    /// Motion of plays that creep, read late or in time, and the samples from one on, of about so
+    /// many of all, that are judged.
+    fn motion(
+        u: &[f64],
+        (most, begin): (usize, usize),
+        lag: &[f64],
+        late: bool,
+    ) -> Result<(Vec<f64>, Vec<usize>)> {
         let drive = Drive { u, dt: 1e-3, hold: Hold::Zero };
-        let delay = WeightsDelay::Fitted(0.0, 0.01);
+        let in_time = WeightsDelay::Known(0.0);
+        let delay = if late { WeightsDelay::Fitted(0.0, 0.01) } else { in_time };
         let record = WeightsRecord { delay, ..WeightsRecord::of(drive, u, 3) };
         with_fit(record, most, |mut fit| {
             fit.restructure(|fit| {
@@ -129,6 +140,7 @@ mod tests {
             fit.x[layout.weights()].fill(0.3);
             fit.x[layout.creep_weights()].fill(0.1);
             fit.x[own.delay].fill(3.4e-3);
+            fit.windows[0].start = begin;
             Ok((fit.motion(0)?, fit.judged(0).map(|one| one.place).collect()))
         })
     }
@@ -139,10 +151,13 @@ mod tests {
         let u: Vec<f64> = (0..600).map(|k| levels[k / 7 % levels.len()]).collect();
         // Behind creep, the input of a lag is taken to be linear within a step.
         for (lag, most) in [(&[][..], 1e-12), (&[-5.0][..], 0.02)] {
-            let ((all, _), (some, judged)) = (motion(&u, 600, lag)?, motion(&u, 120, lag)?);
-            assert!((50..=120).contains(&judged.len()));
-            for k in judged {
-                assert!((all[k] - some[k]).abs() < most, "{k}: {} and {}", all[k], some[k]);
+            for (begin, late) in [(3, true), (3, false), (404, false)] {
+                let (all, _) = motion(&u, (600, begin), lag, late)?;
+                let (some, judged) = motion(&u, (120, begin), lag, late)?;
+                assert!((30..=120).contains(&judged.len()));
+                for k in judged {
+                    assert!((all[k] - some[k]).abs() < most, "{k}: {} and {}", all[k], some[k]);
+                }
             }
         }
         Ok(())
