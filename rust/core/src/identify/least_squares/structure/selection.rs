@@ -70,20 +70,17 @@ pub(in crate::identify::least_squares) fn search<'a>(
     common.count(few.evaluations());
     let mut fit = chosen.on(common);
     let kept = settings.start.as_ref().is_none_or(|start| start.kept);
+    // Of a held drive, the last steps alone need all readings.
+    let judged = kept.then(|| judged_of(common)).filter(|one| one.iter().any(Judged::stays));
+    let all = judged.map(|judged| core::mem::replace(&mut fit.judged, judged));
     if kept {
-        let judged = judged_of(common);
-        if judged.iter().any(Judged::stays) {
-            // The last steps alone need all readings.
-            let all = core::mem::replace(&mut fit.judged, judged);
-            fit.settle(1e-4)?;
-            fit.exact = true;
-            fit.settle(ROUGH)?;
-            fit.judged = all;
-        } else {
-            fit.settle(1e-4)?;
-        }
+        fit.settle(1e-4)?;
     }
     fit.exact = true;
+    if let Some(all) = all {
+        fit.settle(ROUGH)?;
+        fit.judged = all;
+    }
     fit.settle(if kept { 1e-8 } else { ROUGH })?;
     drop_modes(&mut fit)?;
     Some(fit)
