@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["SAME_PERIOD", "is_white", "judged", "noise_of", "period_of", "two_parts"]
+__all__ = ["NOISY", "SAME_PERIOD", "is_white", "judged", "noise_of", "period_of", "two_parts"]
 
+# A residual of so many times the noise has hardly anything but noise in it.
+NOISY = 1.05
 # Share of the window that is fitted, and turns of the drive that each part needs; and the share
 # where it turns too seldom.
 FITTED, TURNS, FITTED_OF_ONE_LOOP = 0.6, 2, 0.75

@@ -15,6 +15,7 @@ from ..fitted.model_entries import origin_of, provenance
 from ..fitted.notes import carried_by_first_samples
 from ..fitted.start import GAIN, Rest, least_voltage, start_at_jump
 from ..methods.least_squares import LeastSquares
+from .judging import NOISY
 from .weights import Structure
 
 if TYPE_CHECKING:
@@ -39,8 +40,6 @@ FIRST, REVERSED = 1500, 0.1
 # record, and ratio of its residual to that of the beginning, or of that and the noise, that ends
 # this.
 ALIKE, TRIED, APART = 1.1, 3, 1.5
-# A residual of so many times the noise has hardly anything but noise in it.
-NOISY = 1.05
 # Fits with a voltage of rest that was found from the one before, at most.
 ROUNDS = 3
 # Share of the stroke below which a residual is no motion, but what a search leaves.

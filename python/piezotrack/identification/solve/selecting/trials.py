@@ -16,11 +16,11 @@ from ....errors import DataError, NumericalError
 from ...fitted.selection import Trial
 from ...fitted.start import GAIN
 from ...methods.least_squares import LeastSquares
-from ..judging import is_white, judged, noise_of, period_of
+from ..judging import NOISY, is_white, judged, noise_of, period_of
 from ..jump import rest_of
 from ..one_model import identify_model, weights_of
 from ..variants.drift import turns_often
-from ..variants.slow_parts import NOISY, with_slow_parts
+from ..variants.slow_parts import with_slow_parts
 from ..weights import Structure
 from .shown import as_shown, with_delays
 

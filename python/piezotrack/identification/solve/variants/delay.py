@@ -10,6 +10,7 @@ from ...fitted.start import Rest
 from ...methods.descents import Descents
 from ...methods.least_squares import LeastSquares
 from ...problem.objective import Objective
+from ..judging import NOISY
 from ..jump import preceded, rest_of
 from ..weights import Structure
 from .drift import GAIN as GAIN_OF_SEARCH
@@ -30,9 +31,9 @@ __all__ = ["with_delay_tried"]
 # Share of the cost that a delay has to take away from a fit by least squares: creep and a lag turn
 # the phase as it does. From a search as much as a drift.
 GAIN = 0.05
-# A residual of so many times the noise has hardly anything but noise in it; up to so many times, a
-# delay changes its structure little, and beyond, where it takes away such a share within it.
-NOISY, NEAR, SIGN = 1.05, 1.5, 0.01
+# Up to so many times the noise, a delay changes the structure of a fit little, and beyond, where it
+# takes away such a share within it.
+NEAR, SIGN = 1.5, 0.01
 # Delays from which descents beside a search begin, in samples.
 BEGUN = (1.0, 5.0)
 

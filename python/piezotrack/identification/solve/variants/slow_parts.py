@@ -12,6 +12,7 @@ from ....errors import DataError, NumericalError
 from ...fitted.start import start_after, start_at_jump
 from ...linearised.sensitivity import LinearisedRecord
 from ...linearised.values import fitted_values, without_search
+from ..judging import NOISY
 from .drift import with_drift_of_few_turns, with_drift_tried
 
 if TYPE_CHECKING:
@@ -25,11 +26,11 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["MOST", "NOISY", "with_slow_parts"]
+__all__ = ["MOST", "with_slow_parts"]
 
-# A residual of so many times the noise has hardly anything but noise in it; up to so many, a drift
-# beside less creep may explain the rest, by such a share better than more creep.
-NOISY, NEAR, LESS = 1.05, 2.0, 0.02
+# Up to so many times the noise, a drift beside less creep may explain the rest, by such a share better
+# than more creep.
+NEAR, LESS = 2.0, 0.02
 # Residual beyond which creep does not explain it: such a share of the one before, and so many times
 # the noise.
 SHARE, FAR = 0.5, 5.0
