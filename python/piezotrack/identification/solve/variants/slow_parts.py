@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = ["MOST", "with_slow_parts"]
 
-# Up to so many times the noise, a drift beside less creep may explain the rest, by such a share better
-# than more creep.
+# Up to so many times the noise, a drift beside less creep may explain the rest, by such a share
+# better than more creep.
 NEAR, LESS = 2.0, 0.02
 # Residual beyond which creep does not explain it: such a share of the one before, and so many times
 # the noise.
