@@ -50,6 +50,22 @@ BRANCHES = pt.BoucWenStage(
 )
 
 
+def of_relays(seed: int) -> pt.Dataset:
+    """24 levels of a drive on a stage of relays with a mode, with noise of 0.1 % of the stroke."""
+    rng = np.random.default_rng(seed)
+    stage = pt.PreisachStage(
+        linear=0.05e-6,
+        levels=tuple(np.linspace(-100.0, 100.0, 7)),
+        masses=tuple(0.2e-6 * rng.uniform(size=21) ** 2),
+        frequency=120.0,
+        damping_ratio=0.1,
+    )
+    u = np.repeat(rng.uniform(-100.0, 100.0, 24), 60)
+    x = stage.simulate(u, DT, hold="zoh").x
+    x += 1e-3 * np.ptp(x) * rng.normal(size=u.size)
+    return pt.Dataset(u=u, y=x, dt=DT, hold="zoh")
+
+
 def of_branches(count: int) -> tuple[pt.Dataset, pt.Dataset]:
     """A triangle whose amplitude falls, with noise of 0.1 % of the stroke; another motion."""
     t = np.linspace(0.0, 10.0, count)
@@ -217,3 +233,33 @@ def test_a_rate_that_only_the_whole_record_shows_decides() -> None:
     noise = of_rates.noise
     assert noise is not None
     assert fit.score(of_rates.others["at 10 Hz"]).rms < 2.0 * noise
+
+
+@pytest.mark.parametrize("seed", [10, 11])
+def test_a_model_that_leaves_only_noise_on_the_whole_is_taken(seed: int) -> None:
+    # The first three fifths do not determine relays (10); plays leave 1.3 times the noise (11).
+    fit = pt.identify(of_relays(seed))
+    assert fit.cost < 1.05 * max(fit.noises)
+
+
+def test_a_search_begins_with_the_rest_that_weights_have_shown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each voltage of rest that is tried takes a search: minutes where the model does not suit."""
+    t = np.linspace(0.0, 6.0, 1200)
+    tops = np.linspace(1.0, 0.2, 12) * np.tile([-60.0, 60.0], 6)
+    u = np.interp(t, np.linspace(0.0, 6.0, 13), [40.0, *tops])
+    x = BRANCHES.simulate(np.append(0.0, u), t[1]).x[1:]
+    x += 1e-4 * np.ptp(x) * np.random.default_rng(1).normal(size=t.size)
+    begun: dict[str, Any] = {}
+
+    def noted(problem: Problem, method: Any, how: Any, start: Any, rest: Any) -> Any:
+        if isinstance(method, pt.ParticleSwarm):
+            begun.setdefault(problem.model, rest)
+        return identify_model(problem, method, how, start, rest)
+
+    monkeypatch.setattr(trials, "identify_model", noted)
+    few = pt.ParticleSwarm(particles=8, iterations=5, seed=1, runs=1)
+    pt.identify(pt.Dataset(u=u, y=x, dt=t[1]), method=few)
+    assert {"first-order-dahl", "bouc-wen"} <= set(begun)
+    assert all(rest is not None and rest.voltage == 0.0 for rest in begun.values())

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from ....errors import DataError, NumericalError
-from ..judging import noise_of
+from ..judging import repeated
 from ..jump import rest_of
 from ..weights import Structure
 from .trials import AS_WELL, MANY_WEIGHTS, MORE_THAN_NOISE, NEAR_NOISE, NOTHING_BUT_NOISE
@@ -22,8 +23,8 @@ __all__ = ["OnWholes"]
 
 # What a fit of few values leaves, in multiples of the noise, where no other one is looked for.
 ONLY_NOISE = 1.1
-# A fit that leaves more than noise gives way to another one that leaves less by this share; one of
-# many weights has to leave less than others by it.
+# A fit that leaves more than noise gives way to another one that leaves less beside the noise by
+# this share; one of many weights has to leave less than others by it.
 BETTER_ON_WHOLE = 0.25
 
 
@@ -49,7 +50,7 @@ class OnWholes:
             few = self.of_few_values(whole)
             if few is not None and few.cost <= min(ONLY_NOISE * noises, AS_WELL * left):
                 return few
-        noise = max(noise_of(record.data) for record in self.problem.records)
+        noise = self.unexplained(found.fit)
         if best.info.name == MANY_WEIGHTS or found.fit.cost > NOTHING_BUT_NOISE * noise:
             found = self.least(found)
         # The structure of the first part is that of the whole where nothing but noise is left.
@@ -67,13 +68,22 @@ class OnWholes:
         kept = None if start is None else replace(start, kept=True)
         return self.trials.identified(self.problem, one.info, self.trials.how, kept, rest)
 
+    def unexplained(self, fit: Identification) -> float:
+        """Return what no model explains [m]: noise between samples, or what does not repeat."""
+        return max(*fit.noises, *(repeated(record.data) for record in self.problem.records))
+
+    def above_noise(self, fit: Identification, times: float) -> float:
+        """Return the residual whose part that is not noise is so many times that of a fit [m]."""
+        noise = self.unexplained(fit)
+        return math.hypot(noise, times * math.sqrt(max(fit.cost**2 - noise**2, 0.0)))
+
     def least(self, found: _Whole, shown: Structure | None = None) -> _Whole:
         """Return what was found, or another model that leaves far less.
 
         Others begin with the structures of their first parts, or with what the whole has shown.
         """
         (best, fit), share = found, 1.0 - BETTER_ON_WHOLE
-        enough = fit.cost / share if best.info.name == MANY_WEIGHTS else share * fit.cost
+        enough = self.above_noise(fit, 1.0 / share if best.info.name == MANY_WEIGHTS else share)
         for one in self.trials.others(best):
             with suppress(DataError, NumericalError):
                 start, rest = (shown, rest_of(fit)) if shown else (one.start, one.rest)
@@ -89,7 +99,8 @@ class OnWholes:
             return found
         with suppress(DataError, NumericalError):
             anew = self.fitted(one)
-            if anew.cost < (1.0 if one is best else 1.0 - BETTER_ON_WHOLE) * fit.cost:
+            enough = fit.cost if one is best else self.above_noise(fit, 1.0 - BETTER_ON_WHOLE)
+            if anew.cost < enough:
                 found, shown = _Whole(one, anew), Structure.of(anew)
                 if len(shown.dynamics) > len(one.start.dynamics):
                     return self.least(found, shown)

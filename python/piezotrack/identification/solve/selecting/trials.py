@@ -155,8 +155,12 @@ class Trials:
         A drift or creep beside plays may stand for what the plays do not describe: Bouc-Wen has
         them only where it leaves more without.
         """
-        # On first parts, what is worse than least squares lacks more than a jump.
-        start = shown if problem is self.problem else None
+        start = None
+        if problem is self.problem:
+            # On first parts, what is worse than least squares lacks more than a jump.
+            start, least = shown, min(self.found, key=lambda one: one.cost, default=None)
+            # Each voltage of rest takes a search.
+            rest = rest or (least.rest if least else None)
 
         def search(one: Problem) -> Identification:
             return identify_model(one.of_model(info), self.methods.method(info), how, start, rest)

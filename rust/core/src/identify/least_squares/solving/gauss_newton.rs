@@ -116,7 +116,10 @@ impl Fit<'_> {
     /// Bounds of all unknowns for a step.
     fn bounds(&self) -> Vec<(f64, f64)> {
         let ranges = self.pole_ranges();
-        let mut bounds = self.layout().bounds(&self.x, self.held, self.bent, &ranges);
+        // Nothing moves yet where all weights are 0, and nothing determines the dynamics.
+        let still = self.x[self.layout().weights()].iter().all(|weight| *weight == 0.0);
+        let held = self.held || still;
+        let mut bounds = self.layout().bounds(&self.x, held, self.bent, &ranges);
         for slot in if self.rigid { self.layout().corners() } else { 0..0 } {
             bounds[slot] = (self.x[slot], self.x[slot]);
         }
