@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import piezotrack as pt
+from piezotrack.identification.solve.judging import repeated
 from virtual import changed
 
 UM = 1e-6
@@ -54,6 +55,25 @@ def test_the_grid_is_found_where_few_levels_show() -> None:
         assert sensor.bandwidth_sd is None
         assert math.isinf(sensor.bandwidth)
         assert "white" in sensor.summary()
+
+
+@pytest.mark.parametrize("spikes", [0, 5])
+def test_what_does_not_repeat_is_the_noise_of_a_stage_that_creeps_from_rest(spikes: int) -> None:
+    # 5.3 periods of 303.03 samples, from a stage that never moved before.
+    random, t = np.random.default_rng(4), np.arange(1600) / 1000.0
+    u = 60.0 + 40.0 * np.sin(2.0 * np.pi * 3.3 * t)
+    stage = pt.PrandtlIshlinskiiStage(
+        linear=1e-7,
+        thresholds=(10.0, 30.0),
+        weights=(5e-8, 5e-8),
+        creep_weights=(0.1,),
+        creep_times=(1.0,),
+    )
+    noise = 1e-3 * UM
+    y = stage.simulate(u, 1e-3).x + noise * random.normal(size=t.size)
+    y[random.integers(0, t.size, spikes)] += 3.0 * UM
+    log = pt.Dataset(u=u, y=y, dt=1e-3).without_faulty_readings()
+    assert repeated(log) == pytest.approx(noise, rel=0.1)
 
 
 def test_a_record_that_moves_is_not_at_rest() -> None:

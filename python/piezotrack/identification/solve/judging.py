@@ -18,7 +18,16 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-__all__ = ["NOISY", "SAME_PERIOD", "is_white", "judged", "noise_of", "period_of", "two_parts"]
+__all__ = [
+    "NOISY",
+    "SAME_PERIOD",
+    "is_white",
+    "judged",
+    "noise_of",
+    "period_of",
+    "repeated",
+    "two_parts",
+]
 
 # A residual of so many times the noise has hardly anything but noise in it.
 NOISY = 1.05
@@ -128,7 +137,22 @@ def repeated(data: Dataset) -> float:
     period = period_of(data)
     if period is None:
         return 0.0
-    return float(np.std(data.y[period:] - data.y[:-period])) / math.sqrt(2.0)
+    y = data.y if data.left_out is None else np.where(data.left_out, np.nan, data.y)
+    change, slope = y[period:] - y[:-period], np.gradient(y)
+    # The period may lie between two samples; a sensor drifts and a stage creeps.
+    basis = np.stack(
+        [slope[period:] + slope[:-period], np.arange(change.size), np.ones(change.size)]
+    )
+    left = []
+    for first in range(0, max(change.size - period, 0) + 1, period):
+        some = slice(first, first + period)
+        seen = np.isfinite(change[some]) & np.isfinite(basis[0, some])
+        columns, cycle = basis[:, some][:, seen].T, change[some][seen]
+        if seen.any():
+            fitted = columns @ np.linalg.lstsq(columns, cycle, rcond=None)[0]
+            left.append(float(np.sqrt(np.mean((cycle - fitted) ** 2))))
+    # The first period may be one from rest.
+    return min(left, default=0.0) / math.sqrt(2.0)
 
 
 def period_of(data: Dataset) -> int | None:

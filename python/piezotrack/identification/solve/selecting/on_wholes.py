@@ -69,13 +69,17 @@ class OnWholes:
         return self.trials.identified(self.problem, one.info, self.trials.how, kept, rest)
 
     def unexplained(self, fit: Identification) -> float:
-        """Return what no model explains [m]: noise between samples, or what does not repeat."""
-        return max(*fit.noises, *(repeated(record.data) for record in self.problem.records))
+        """Return what no model explains [m]: noise between samples, or what does not repeat.
+
+        Not more than a fit leaves: a first period from rest, too, differs from those after it.
+        """
+        floors = [*fit.noises, *(repeated(record.data) for record in self.problem.records)]
+        return max((one for one in floors if one < fit.cost), default=fit.cost)
 
     def above_noise(self, fit: Identification, times: float) -> float:
         """Return the residual whose part that is not noise is so many times that of a fit [m]."""
         noise = self.unexplained(fit)
-        return math.hypot(noise, times * math.sqrt(max(fit.cost**2 - noise**2, 0.0)))
+        return math.hypot(noise, times * math.sqrt(fit.cost**2 - noise**2))
 
     def least(self, found: _Whole, shown: Structure | None = None) -> _Whole:
         """Return what was found, or another model that leaves far less.
