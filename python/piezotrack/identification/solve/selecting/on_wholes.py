@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from ....errors import DataError, NumericalError
-from ..judging import repeated
+from ..judging import period_of, repeated
 from ..jump import rest_of
 from ..weights import Structure
 from .trials import AS_WELL, MANY_WEIGHTS, MORE_THAN_NOISE, NEAR_NOISE, NOTHING_BUT_NOISE
@@ -24,7 +24,8 @@ __all__ = ["OnWholes"]
 # What a fit of few values leaves, in multiples of the noise, where no other one is looked for.
 ONLY_NOISE = 1.1
 # A fit that leaves more than noise gives way to another one that leaves less beside the noise by
-# this share; one of many weights has to leave less than others by it.
+# this share; one of many weights has to leave less than others by it, noise included where a drive
+# that repeats does not determine them.
 BETTER_ON_WHOLE = 0.25
 
 
@@ -87,7 +88,12 @@ class OnWholes:
         Others begin with the structures of their first parts, or with what the whole has shown.
         """
         (best, fit), share = found, 1.0 - BETTER_ON_WHOLE
-        enough = self.above_noise(fit, 1.0 / share if best.info.name == MANY_WEIGHTS else share)
+        many = best.info.name == MANY_WEIGHTS
+        repeats = any(period_of(record.data) for record in self.problem.records)
+        if many and repeats:
+            enough = fit.cost / share
+        else:
+            enough = self.above_noise(fit, 1.0 / share if many else share)
         for one in self.trials.others(best):
             with suppress(DataError, NumericalError):
                 start, rest = (shown, rest_of(fit)) if shown else (one.start, one.rest)
