@@ -80,7 +80,7 @@ class OnWholes:
     def above_noise(self, fit: Identification, times: float) -> float:
         """Return the residual whose part that is not noise is so many times that of a fit [m]."""
         noise = self.unexplained(fit)
-        return math.hypot(noise, times * math.sqrt(fit.cost**2 - noise**2))
+        return math.hypot(noise, times * math.sqrt((fit.cost - noise) * (fit.cost + noise)))
 
     def least(self, found: _Whole, shown: Structure | None = None) -> _Whole:
         """Return what was found, or another model that leaves far less.
