@@ -98,6 +98,30 @@ def quick(seed: int = 0) -> pt.Dataset:
 QUICK = pt.ParticleSwarm(particles=12, iterations=30)
 
 
+def of_relays(
+    seed: int,
+    *,
+    intervals: int = 6,
+    mass: float = 0.2e-6,
+    damping_ratio: float = 0.1,
+    steps: int = 24,
+    share: float = 1e-3,
+) -> tuple[pt.Dataset, float]:
+    """Steps of a stage of relays with a mode, and its noise [m]: a share of the stroke."""
+    random = np.random.default_rng(seed)
+    stage = pt.PreisachStage(
+        linear=0.05e-6,
+        levels=tuple(np.linspace(-100.0, 100.0, intervals + 1)),
+        masses=tuple(mass * random.uniform(size=intervals * (intervals + 1) // 2) ** 2),
+        frequency=120.0,
+        damping_ratio=damping_ratio,
+    )
+    u = np.repeat(random.uniform(-100.0, 100.0, steps), 60)
+    x = stage.simulate(u, 1e-3, hold="zoh").x
+    noise = share * float(np.ptp(x))
+    return pt.Dataset(u=u, y=x + noise * random.normal(size=u.size), dt=1e-3, hold="zoh"), noise
+
+
 def entries(
     *,
     fixed: Mapping[str, Any] | None = None,

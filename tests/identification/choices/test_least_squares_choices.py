@@ -12,6 +12,7 @@ import piezotrack as pt
 from piezotrack import _core
 from piezotrack.identification.problem.problem import Problem
 from play_records import PLAIN, STAGE, drive, record
+from records import of_relays
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -244,18 +245,9 @@ def test_resonances_of_a_record() -> None:
 
 @pytest.mark.parametrize("seed", [0, 4])
 def test_twelve_intervals_of_levels_are_weighed_before_a_mode_moves(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    stage = pt.PreisachStage(
-        linear=0.05e-6,
-        levels=tuple(np.linspace(-100.0, 100.0, 13)),
-        masses=tuple(0.02e-6 * rng.uniform(size=78) ** 2),
-        frequency=120.0,
-        damping_ratio=0.05,
+    log, noise = of_relays(
+        seed, intervals=12, mass=0.02e-6, damping_ratio=0.05, steps=40, share=1e-4
     )
-    u = np.repeat(rng.uniform(-100.0, 100.0, 40), 60)
-    x = stage.simulate(u, DT, hold="zoh").x
-    noise = 1e-4 * float(np.ptp(x))
-    x += noise * rng.normal(size=u.size)
-    fit = pt.identify(pt.Dataset(u=u, y=x, dt=DT, hold="zoh"), model="preisach")
+    fit = pt.identify(log, model="preisach")
     # Six intervals leave 3.1 and 1.2 times the noise.
     assert fit.cost < 1.05 * noise

@@ -19,7 +19,7 @@ from piezotrack.identification.solve.one_model import identify_model
 from piezotrack.identification.solve.selecting import trials
 from piezotrack.identification.solve.selecting.shown import as_shown
 from piezotrack.identification.solve.weights import Structure
-from records import selection_of
+from records import of_relays, selection_of
 
 DT = 1e-3
 T = DT * np.arange(4000)
@@ -48,22 +48,6 @@ BRANCHES = pt.BoucWenStage(
     gamma=-10.0,
     exponent=1.6,
 )
-
-
-def of_relays(seed: int) -> pt.Dataset:
-    """24 levels of a drive on a stage of relays with a mode, with noise of 0.1 % of the stroke."""
-    rng = np.random.default_rng(seed)
-    stage = pt.PreisachStage(
-        linear=0.05e-6,
-        levels=tuple(np.linspace(-100.0, 100.0, 7)),
-        masses=tuple(0.2e-6 * rng.uniform(size=21) ** 2),
-        frequency=120.0,
-        damping_ratio=0.1,
-    )
-    u = np.repeat(rng.uniform(-100.0, 100.0, 24), 60)
-    x = stage.simulate(u, DT, hold="zoh").x
-    x += 1e-3 * np.ptp(x) * rng.normal(size=u.size)
-    return pt.Dataset(u=u, y=x, dt=DT, hold="zoh")
 
 
 def of_branches(count: int) -> tuple[pt.Dataset, pt.Dataset]:
@@ -238,7 +222,8 @@ def test_a_rate_that_only_the_whole_record_shows_decides() -> None:
 @pytest.mark.parametrize("seed", [10, 11])
 def test_a_model_that_leaves_only_noise_on_the_whole_is_taken(seed: int) -> None:
     # The first three fifths do not determine relays (10); plays leave 1.3 times the noise (11).
-    fit = pt.identify(of_relays(seed))
+    log, _ = of_relays(seed)
+    fit = pt.identify(log)
     assert fit.cost < 1.05 * max(fit.noises)
 
 

@@ -122,7 +122,8 @@ def noise_of(data: Dataset) -> float:
 def repeated(data: Dataset) -> float:
     """Return what of a displacement does not repeat with a periodic drive, rms [m]; else 0.
 
-    No model of the drive explains more than what repeats.
+    No model of the drive explains more than what repeats, but for what is slow: a first period
+    from rest, creep, and a drift.
 
     Parameters
     ----------
@@ -132,14 +133,15 @@ def repeated(data: Dataset) -> float:
     Returns
     -------
     float
-        Standard deviation of the difference between periods, over the root of 2.
+        Rms of the difference of two periods, less a line and a shift in time, over the root of 2:
+        of the neighbours that differ least.
     """
     period = period_of(data)
     if period is None:
         return 0.0
     y = data.y if data.left_out is None else np.where(data.left_out, np.nan, data.y)
     change, slope = y[period:] - y[:-period], np.gradient(y)
-    # The period may lie between two samples; a sensor drifts and a stage creeps.
+    # The period may lie between two samples.
     basis = np.stack(
         [slope[period:] + slope[:-period], np.arange(change.size), np.ones(change.size)]
     )
@@ -151,7 +153,6 @@ def repeated(data: Dataset) -> float:
         if seen.any():
             fitted = columns @ np.linalg.lstsq(columns, cycle, rcond=None)[0]
             left.append(float(np.sqrt(np.mean((cycle - fitted) ** 2))))
-    # The first period may be one from rest.
     return min(left, default=0.0) / math.sqrt(2.0)
 
 

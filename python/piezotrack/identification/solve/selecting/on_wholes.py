@@ -70,10 +70,7 @@ class OnWholes:
         return self.trials.identified(self.problem, one.info, self.trials.how, kept, rest)
 
     def unexplained(self, fit: Identification) -> float:
-        """Return what no model explains [m]: noise between samples, or what does not repeat.
-
-        Not more than a fit leaves: a first period from rest, too, differs from those after it.
-        """
+        """Return what no model explains [m], less than a fit leaves: noise, or no repetition."""
         floors = [*fit.noises, *(repeated(record.data) for record in self.problem.records)]
         return max((one for one in floors if one < fit.cost), default=fit.cost)
 
